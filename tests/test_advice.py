@@ -15,7 +15,7 @@ import scantruss as st
 from scantruss import pipeline
 from scantruss.candidates import Attempt
 from scantruss.cli.main import main
-from scantruss.report.advice import SURE_PER_SPACING, Advice
+from scantruss.report.advice import LEAST_TRIED, MOST_TRIED, SURE_PER_SPACING, TRIED_AROUND, Advice
 from scantruss.scan.member_length import length_range, round_length
 from scantruss.surface.samples import SurfaceSamples
 
@@ -153,10 +153,41 @@ def test_the_length_nearby_is_the_nearest_that_passes_and_costs_no_more_than_twe
     made = counted_runs(monkeypatch, lambda length: length > 1.15 * failing)
     assert Advice(cloud, st.Settings(length=1.0)).nearby(failing) == pytest.approx(1.25 * failing, rel=0.03)
     cost = sum(max(1.0, (failing / length) ** 2) for length in made)
-    assert cost <= 20.0
+    assert cost <= MOST_TRIED == 20.0
     made = counted_runs(monkeypatch, lambda length: False)
     assert Advice(cloud, st.Settings(length=1.0)).nearby(failing) is None
     assert sum(max(1.0, (failing / length) ** 2) for length in made) <= 20.0 and len(set(made)) >= 4
+
+
+def test_a_suggestion_and_its_table_cost_no_more_than_so_many_grids_and_points(
+    place: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    usual = Advice(cloud_of("limpet"), st.Settings(length=1.0)).suggest()
+    made = counted_runs(monkeypatch, lambda length: False)
+    assert main(["info", "limpet.xyz"]) == 0
+    assert "no length passes of those tried" in capsys.readouterr().out
+    assert sum(max(1.0, (usual / length) ** 2) for length in made) <= MOST_TRIED + TRIED_AROUND
+    made = counted_runs(monkeypatch, lambda length: False)
+    monkeypatch.setattr("scantruss.report.advice.MOST_LOOKED_AT", 1)
+    Advice(cloud_of("limpet"), st.Settings(length=1.0)).suggest()
+    assert 1 <= len(made) <= LEAST_TRIED
+
+
+def test_a_length_that_is_tried_again_goes_on_where_it_paused(monkeypatch: pytest.MonkeyPatch) -> None:
+    cloud = cloud_of("limpet")
+    made: list[Attempt] = []
+
+    def fails(cloud: st.PointCloud, attempt: Attempt, **others: Any) -> st.Grid:
+        made.append(attempt)
+        raise st.FrontError(f"fault {len(made)}")
+
+    monkeypatch.setattr(pipeline, "make_grid", fails)
+    advice, length = Advice(cloud, st.Settings(length=1.0)), length_range(cloud)[1] / 2
+    first = known(advice.try_length(length, 2))
+    assert first.paused and not first.passed and first.grids == len(made) == 2
+    again = known(advice.try_length(length, 5))
+    assert again.grids == len(made) == 5 and len(set(map(id, made))) == 5 and str(again.fault) == "fault 1"
+    assert known(advice.try_length(length, 5)).grids == 5
 
 
 def test_the_suggested_length_passes_also_where_the_usual_one_and_its_neighbours_do_not(
@@ -184,7 +215,11 @@ def test_info_says_which_lengths_pass_and_why_others_do_not(
     span = next(line for line in said.splitlines() if line.startswith("passes, of the"))
     low, high = (float(word) for word in span.split(": ")[1].split(" to "))
     assert low < usual <= high < 1.2 * usual
-    longer = [line for line in said.splitlines() if "no grid passes: the front cannot close" in line]
+    longer = [
+        line
+        for line in said.splitlines()
+        if line.endswith((" passes: the front cannot close", " pass: the front cannot close"))
+    ]
     assert longer and all(float(line.split()[0]) > high for line in longer)
 
 

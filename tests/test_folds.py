@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from marks import compiled_only
 
 import scantruss as st
 from scantruss.kernels.surface import folds
@@ -30,10 +31,10 @@ def patch_at(surface: Surface, place: np.ndarray, strength: float = 1.0) -> tupl
 
 
 @cache
-def roof(rise: float) -> Surface:
+def roof(rise: float, points: int = 4_000) -> Surface:
     """Return the surface of a gable of length 6 along y whose flanks rise by `rise` per unit."""
     rng = np.random.default_rng(2)
-    x, y = rng.uniform(-3, 3, 20_000), rng.uniform(-3, 3, 20_000)
+    x, y = rng.uniform(-3, 3, points), rng.uniform(-3, 3, points)
     return surface_of(np.column_stack([x, y, -rise * np.abs(x)]))
 
 
@@ -55,9 +56,10 @@ def test_the_middle_of_a_member_off_the_surface_falls_down_its_slope() -> None:
         assert before > 0.0 and folds.chord_energy(patches, 0, 1, *(place - 1e-3 * slope)) < before
 
 
+@compiled_only
 @pytest.mark.parametrize("rise", [1.0, 1.5])
 def test_a_node_beside_a_fold_is_drawn_to_its_crest(rise: float) -> None:
-    patches, surface = patch_at(roof(rise), np.array([0.2, 0.0, -0.2 * rise]))
+    patches, surface = patch_at(roof(rise, 20_000), np.array([0.2, 0.0, -0.2 * rise]))
     energies = [folds.fold_energy(patches, 0, x, 0.0, -rise * abs(x)) for x in np.linspace(-0.4, 0.4, 81)]
     assert abs(np.linspace(-0.4, 0.4, 81)[np.argmin(energies)]) < 0.15  # from 0.2
     beside = (0.1, 0.0, -0.1 * rise)
@@ -69,7 +71,7 @@ def test_a_node_beside_a_fold_is_drawn_to_its_crest(rise: float) -> None:
 
 def test_a_gentle_bend_is_no_fold() -> None:
     rng = np.random.default_rng(2)
-    x, y = rng.uniform(-3, 3, 20_000), rng.uniform(-3, 3, 20_000)
+    x, y = rng.uniform(-3, 3, 4_000), rng.uniform(-3, 3, 4_000)
     patches, surface = patch_at(surface_of(np.column_stack([x, y, -0.1 * (x * x + y * y)])), np.zeros(3))
     assert patches[0, folds.FOLD_WEIGHT] == 0.0 and folds.fold_energy(patches, 0, 0.3, 0.0, 0.4) == 0.0
     assert folds.onto_crest(surface, patches[0], (0.3, 0.0, 0.1)) == (0.3, 0.0, 0.1)

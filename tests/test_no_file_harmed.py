@@ -147,7 +147,7 @@ def test_results_of_our_own_are_replaced_and_those_of_others_by_force(
             == 0
         )
         assert main(["schedule", "one.json", "s.xlsx", "s.csv", "--tube", "60", "--unit", "m"]) == 0
-        assert main(["sweep", "a.xyz", "--length", "1.5,2", "-o", "sweep"]) == 0
+        assert main(["sweep", "a.xyz", "--length", "2", "--effort", "quick", "-o", "sweep", "--workers", "1"]) == 0
     capsys.readouterr()
     assert main(["grid", "a.xyz", "theirs.obj", "--length", LENGTH, "--force"]) == 0
     assert kind_of_ours(place / "theirs.obj") == "result"

@@ -109,7 +109,7 @@ def test_rows_are_the_same_for_any_number_of_processors(processors: int, monkeyp
 
 
 @pytest.mark.kernels
-@pytest.mark.parametrize("seed, left_out", [(0, 0.125), (1, 0.0), (2, 0.125), (3, 0.125), (4, 0.0)])
+@pytest.mark.parametrize("seed, left_out", [(0, 0.125), (1, 0.0), (2, 0.125)])
 def test_on_a_plate_the_rows_are_a_perfect_lattice_along_its_longest_side(seed: int, left_out: float) -> None:
     """All lie on it. Up to an eighth of its nodes are nearest to no post and are left out: the front makes these itself."""
     _, scan = scanned(sheet(12.0, 8.0, 0.2, seed=seed), 1.0)

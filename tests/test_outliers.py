@@ -203,11 +203,11 @@ def test_bulk_is_the_share_of_the_spread_across_the_plane_of_the_living_around(s
 def test_bulk_is_a_third_in_a_ball_and_nothing_on_a_plane_or_line(
     extent: tuple[int, int, int], expected: float
 ) -> None:
-    points = np.random.default_rng(0).normal(size=(8000, 3)) * extent
+    points = np.random.default_rng(0).normal(size=(3000, 3)) * extent
     near = Nearby.of(points)
-    middle = np.flatnonzero(np.linalg.norm(near.tree.points, axis=1) < 0.5)[:200]
+    middle = np.flatnonzero(np.linalg.norm(near.tree.points, axis=1) < 0.5)[:80]
     bulk = np.empty(len(middle))
-    kernels_of_outliers.measure_bulk(near.tree, np.ones(8000, np.bool_), middle, bulk, 0, len(middle))
+    kernels_of_outliers.measure_bulk(near.tree, np.ones(3000, np.bool_), middle, bulk, 0, len(middle))
     assert bulk.mean() == pytest.approx(expected, abs=0.1)
 
 

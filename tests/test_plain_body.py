@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from marks import compiled_only
 from numpy.typing import NDArray
+from scipy import ndimage
 
 import scantruss as st
-from scantruss.surface.body import LIMB_RADIUS, SLIT_RADIUS, opened_body
+from scantruss.surface.body import LIMB_RADIUS, SLIT_RADIUS, _distance, _Lattice, opened_body
 from scantruss.surface.samples import sample_surface
 
 LENGTH, RADIUS, SPACING = 1.0, 4.0, 0.1
@@ -45,6 +46,17 @@ def straight(far: float) -> Points:
 def outside(points: Points) -> Points:
     """The points of a rod that do not lie in the ball."""
     return points[np.linalg.norm(points, axis=1) > RADIUS]
+
+
+@pytest.mark.kernels
+@pytest.mark.parametrize("reach", [0, 1, 3, 7])
+@pytest.mark.parametrize("share", [0.0, 0.002, 0.05, 1.0])
+def test_distances_between_voxels_are_exact_within_their_reach(reach: int, share: float) -> None:
+    marked = np.random.default_rng(reach).random((37, 19, 23)) < share
+    found = _distance(marked, _Lattice(np.zeros(3), 0.5, marked.shape), 0.5 * reach)
+    near = 0.5 * ndimage.distance_transform_edt(~marked) if marked.any() else np.full(marked.shape, np.inf)
+    within = near <= 0.5 * reach
+    assert (found[within] == near[within]).all() and (found[~within] > 0.5 * reach).all()
 
 
 @pytest.mark.parametrize("radius", [0.2, 0.3, 0.35])

@@ -81,7 +81,7 @@ def test_what_never_comes_back_is_ended_and_cleaned_up(tmp_path: Path, number: s
 def commands(tmp_path_factory: pytest.TempPathFactory) -> Commands:
     """Commands on a small scan, and how long each runs."""
     scan = tmp_path_factory.mktemp("scan") / "scan.ply"
-    make_scan(scan, 100_000)
+    make_scan(scan, 30_000)
     grid = str(scan.with_name("grid.json"))
     words = ["grid", str(scan), grid, "--length", "6", "--effort", "quick", "--quiet"]
     subprocess.run([sys.executable, "-m", "scantruss", *words], check=True)

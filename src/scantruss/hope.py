@@ -27,19 +27,27 @@ class Hope:
     """
 
     def __init__(self, cells: str = "triangle") -> None:
-        self._cells = cells
+        self._most = MOST_RUNS if cells == "triangle" else min(MOST_RUNS, MOST_RUNS_OF_CELLS)
+        self._allowed = self._most
         self._settings: Settings | None = None
         self._far = self._given_up = 0
-        self._runs, self._looks_one_sided = 0, False
+        self.runs, self._looks_one_sided = 0, False  #: grids that were made
+
+    def allow(self, more: int) -> None:
+        """Pause after some more grids."""
+        self._allowed = min(self._most, self.runs + more)
 
     def is_left(self) -> bool:
-        """Whether any attempt is worth making."""
-        most = MOST_RUNS if self._cells == "triangle" else min(MOST_RUNS, MOST_RUNS_OF_CELLS)
-        return self._given_up < MOST_GIVEN_UP and self._runs < most
+        """Whether any attempt is worth making, and allowed."""
+        return self._given_up < MOST_GIVEN_UP and self.runs < self._allowed
+
+    def is_paused(self) -> bool:
+        """Whether attempts would be worth making that are not allowed."""
+        return self._given_up < MOST_GIVEN_UP and self._allowed <= self.runs < self._most
 
     def begin(self) -> None:
         """Note that a grid is made."""
-        self._runs += 1
+        self.runs += 1
 
     def allows(self, attempt: Attempt) -> bool:
         """Whether an attempt is worth making."""

@@ -162,7 +162,12 @@ def symmetric_grid(
 
 
 def first_that_passes(
-    cloud: PointCloud, settings: Settings, tried: Iterable[Attempt], *, progress: Progress | None = None
+    cloud: PointCloud,
+    settings: Settings,
+    tried: Iterable[Attempt],
+    *,
+    hope: Hope | None = None,
+    progress: Progress | None = None,
 ) -> Grid:
     """Return the grid of the first attempt that passes the checks.
 
@@ -173,6 +178,8 @@ def first_that_passes(
         Those that were asked for.
     tried : iterable of Attempt
         The attempts in their order.
+    hope : Hope, optional
+        How many are worth making.
 
     Raises
     ------
@@ -181,7 +188,7 @@ def first_that_passes(
         of a grid of the mean surface that only leaves out too much.
     """
     faults: list[ScanTrussError] = []
-    hope, advice = Hope(settings.cells), ""
+    hope, advice = hope or Hope(settings.cells), ""
     for attempt in tried:
         if not hope.allows(attempt):
             continue

@@ -97,6 +97,11 @@ def number(text: str) -> float:
         raise argparse.ArgumentTypeError(f"needs a number, got {text!r}") from None
 
 
+def numbers(text: str) -> tuple[float, ...]:
+    """Return numbers with commas between them, or refuse the text."""
+    return tuple(number(word.strip()) for word in text.split(","))
+
+
 def length_or_field(text: str) -> float | str:
     """Return the value of ``--length``: a number, else "curvature:MIN:MAX" or the name of a file of lengths as it stands."""
     with suppress(ValueError):
@@ -225,6 +230,8 @@ def _add_options(group: argparse._ArgumentGroup, specs: Iterable[Field[Any]]) ->
         if spec.name in ("fixed", "fill_at", "no_ridge_at"):
             options |= {"action": "append", "type": position, "metavar": "X,Y,Z"}
             options["help"] += "; repeatable"
+        elif spec.name == "rows_along":
+            options |= {"type": numbers, "metavar": "X,Y,Z,DX,DY,DZ"}
         elif spec.name == "length":
             options |= {"type": length_or_field, "metavar": "NUMBER|FILE|curvature:MIN:MAX"}
         elif spec.name in ("fixed_lines", "boundary"):

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..boundary.find import Boundary, Loop, characteristic_points
+from ..errors import InputError, words_of_place
 from ..kernels.front.candidate_nodes import CandidateNodes
 from ..kernels.geometry.vectors import Vector
 from ..kernels.surface import orientation_field as kernels
@@ -29,6 +30,7 @@ SAMPLES_FOR_THREADS = 5000  # fewest samples of a level that two threads smooth 
 CANDIDATE_REACH = 0.7  # candidate nodes farther from their sample than this are dropped [member lengths]
 # lattice spacing on a closed surface, where the search adds nodes and never removes any [member lengths]
 CLOSED_SPACING = 1.02
+LEAST_ALONG = 0.1  # least part of an arrow along the scan [its length]
 CANDIDATE_DISTANCE = 0.6  # least distance between candidate nodes [member lengths]
 
 
@@ -79,6 +81,8 @@ def usual_starts(samples: SurfaceSamples, settings: Settings) -> tuple[FieldStar
     """Return the layouts of the fronts, as many as the effort allows."""
     if settings.method == "paper":
         return (FieldStart(laid=False),)
+    if settings.rows_along:
+        return tuple(start for start in STARTS_OF_EFFORTS[settings.effort] if start.turn == 0.0)
     if samples.graded:
         return tuple(FieldStart(scale=scale, laid=False) for scale in SCALES_OF_EFFORTS[settings.effort])
     large = samples.graded_area > SMALL_AREA * settings.length**2
@@ -110,18 +114,20 @@ def orientation_fields(
     def field_of(start: FieldStart) -> Field:
         if not start.laid:
             return Field(start, None)
-        length = closed * start.scale * settings.length
-        return Field(start, orientation_field(hierarchies[start.scale].copy(), samples, boundary, length, start.turn))
+        length, arrow = closed * start.scale * settings.length, settings.rows_along
+        begin = lattice_along(samples, arrow) if arrow else lattice_start(samples, boundary, length, start.turn)
+        return Field(start, orientation_field(hierarchies[start.scale].copy(), begin, length))
 
     return list(side_by_side(*(partial(field_of, start) for start in starts)))
 
 
-def orientation_field(
-    hierarchy: Hierarchy, samples: SurfaceSamples, boundary: Boundary, length: float, turn: float
-) -> CandidateNodes:
-    """Return the nodes of a lattice of a spacing [scan unit], turned by an angle [degree] from the longest side of the boundary."""
+LatticeStart = tuple[int, Vector, Vector]  # sample, direction and node from which a lattice is laid out
+
+
+def orientation_field(hierarchy: Hierarchy, begin: LatticeStart, length: float) -> CandidateNodes:
+    """Return the nodes of a lattice of a spacing [scan unit], laid out from a sample."""
     levels, owners, independent_sets = hierarchy
-    start, direction, node = lattice_start(samples, boundary, length, turn)
+    start, direction, node = begin
     for owner in owners:
         start = int(owner[start])
     kernels.lay_first(levels[-1], start, direction, node, length, np.empty(len(levels[-1].mean), np.int64))
@@ -188,9 +194,28 @@ def _independent_sets(level: Level) -> tuple[np.ndarray, ...]:
     return np.flatnonzero(~late & ~between), np.flatnonzero(late & ~between), np.flatnonzero(between)
 
 
-def lattice_start(
-    samples: SurfaceSamples, boundary: Boundary, length: float, turn: float
-) -> tuple[int, Vector, Vector]:
+def lattice_along(samples: SurfaceSamples, arrow: Sequence[float]) -> LatticeStart:
+    """Return the start of a lattice whose rows run along an arrow, a place and a direction in the frame of the scan.
+
+    Raises
+    ------
+    InputError
+        The place lies off the scan, or the arrow is square to it.
+    """
+    surface = samples.surface
+    arm = surface.mean - (np.array(arrow[:3]) - samples.origin)
+    away = dots(arm, arm)
+    sample = int(away.argmin())
+    if away[sample] > surface.length**2:
+        raise InputError(f"the arrow of rows_along begins off the scan, at {words_of_place(arrow[:3])}")
+    ahead, normal = np.array(arrow[3:]) / np.linalg.norm(arrow[3:]), surface.normals[sample]
+    ahead = ahead - normal * (ahead @ normal)
+    if np.linalg.norm(ahead) < LEAST_ALONG:
+        raise InputError("the arrow of rows_along is square to the scan; give a direction along it")
+    return sample, (*ahead.tolist(),), (*surface.mean[sample].tolist(),)
+
+
+def lattice_start(samples: SurfaceSamples, boundary: Boundary, length: float, turn: float) -> LatticeStart:
     """Return the sample, the direction and the node where the lattice starts: in the middle of the longest side of the boundary.
 
     On a closed surface it starts anywhere.

@@ -1,20 +1,20 @@
-"""Which member length to take: quick runs try lengths; one that passes, as the next longer one does, is suggested.
+"""Which member length to take: quick grids try lengths; one that passes, as the next longer one does, is suggested.
 
-How much is tried is counted in quick runs at the length that was asked for, not in seconds: the same scan gets the same advice.
+How much is tried is counted in grids and in points, not in seconds: the same scan gets the same advice.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import chain, dropwhile, takewhile, tee
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..candidates import attempts
-from ..errors import FrontError, LengthError
+from ..errors import FrontError, LengthError, OneSidedError
+from ..hope import Hope
 from ..pipeline import first_that_passes
 from ..scan.member_length import exact_range, length_range, round_length, suggest_length
 from ..surface.samples import sample_surface
@@ -27,10 +27,11 @@ if TYPE_CHECKING:
     from ..scan.cloud import PointCloud
     from ..settings import Settings
 
-#: lengths to try in turn, as multiples of the usual one: first by what usually gives a grid (True), later by all that may
+A_FEW, SOME_MORE = 3, 8  # grids that are made of a length before others are tried, and when it is tried again
+#: lengths to try in turn, as multiples of the usual one, with how many grids are made of each
 LADDER_OF_LENGTHS = (
-    (1.0, True), (1.4, True), (1.0, False), (2.0, True), (1.4, False), (1 / 1.4, True), (2.8, True), (2.0, False),
-    (1 / 1.4, False), (0.5, True), (2.8, False),
+    (1.0, A_FEW), (1.4, A_FEW), (2.0, A_FEW), (1.0, SOME_MORE), (1 / 1.4, A_FEW), (1.4, SOME_MORE), (2.8, A_FEW),
+    (2.0, SOME_MORE), (0.5, A_FEW), (2.8, SOME_MORE),
 )  # fmt: skip
 NEXT_LENGTH = 1.4  # a length is suggested if that many times it passes too
 NEARBY_LENGTHS = (
@@ -49,9 +50,12 @@ NEARBY_LENGTHS = (
 # spacings in a member from which holes in the sampling are seldom taken for holes of the surface
 SURE_PER_SPACING = 8.0
 MOST_LOST = 0.01  # share of the scan that may be lost at a length that is suggested
-RUNS_NEARBY = 20.0  # quick runs that are made to find a length nearby
-RUNS_USUAL = 4.0  # quick runs that are made at the usual length where no length nearby passes and it is far away
-MOST_QUICK_RUNS = 60.0  # quick runs that are made for a suggestion and the lengths around it
+MOST_TRIED = 20.0  # grids that are made for a suggestion, or to find a length nearby, each counted by its cost
+MOST_LOOKED_AT = 2_000_000  # points that are looked at for that
+LEAST_TRIED = 5.0  # grids that are made for that even where the scan has more points
+TRIED_AROUND = 6.0  # grids that are made besides for the lengths of the table, one each
+TRIED_USUAL = 4.0  # grids that are made at the usual length where no length nearby passes and it is far away
+POINTS_PER_MEMBER = 9  # points that cost as much as a member of the grid
 MOST_MEMBERS = 60_000  # members of a grid that is made to try a length
 CLOSE_BEND = 0.95  # share of the scan that is less bent than the radius that is named
 
@@ -63,6 +67,8 @@ class LengthTrial:
     length: float  #: [scan unit]
     grid: Grid | None  #: with its certificate; None if there is none
     fault: FrontError | None = None
+    grids: int = 0  #: how many were made
+    paused: bool = False  #: whether more might come of it
 
     @property
     def passed(self) -> bool:
@@ -93,30 +99,46 @@ class Advice:
         self._cloud, self._progress = cloud, progress
         self._settings = settings.replace(effort="quick", length_field="")
         self._found: dict[float, LengthTrial] = {}
-        self._briefly: set[float] = set()  # of these, by what usually gives a grid only
+        self._begun: dict[float, tuple[Settings, Iterator[Attempt], Hope]] = {}  # what is left to try of each length
+        self.is_spent = False  #: whether a suggestion was looked for
         self._usual = suggest_length(cloud)
-        self._runs, self._run_length = (
-            MOST_QUICK_RUNS,
-            self._usual,
-        )  # quick runs that are left, and the length they are counted at
+        self._count_at(self._usual, MOST_TRIED)
 
-    def try_length(self, length: float, *, briefly: bool = False) -> LengthTrial | None:
-        """Return what comes of a length; None where that was not tried: it is out of range, takes too many members, or runs are used up."""
+    def _count_at(self, length: float, most: float) -> None:
+        """Allow so many grids from now on, or fewer where the scan is large; a shorter length costs more than one that counts once."""
+        self._counted_at = length
+        cost = len(self._cloud.points) + POINTS_PER_MEMBER * self.members(length)
+        self._left = min(most, max(LEAST_TRIED, MOST_LOOKED_AT / cost))
+
+    def try_length(self, length: float, most: int = SOME_MORE) -> LengthTrial | None:
+        """Return what comes of a length; None where that was not tried: it is out of range, takes too many members, or enough was tried.
+
+        Parameters
+        ----------
+        length : float
+            [scan unit]
+        most : int
+            Grids that are made at most in this call; a later one goes on from there.
+        """
         known = self._found.get(length)
-        if known is not None and (known.passed or briefly or length not in self._briefly):
+        if known is not None and (known.passed or not known.paused):
             return known
         low, high = exact_range(self._cloud)
         if not low * (1 - 1e-9) <= length <= high * (1 + 1e-9) or self.members(length) > MOST_MEMBERS:
             return None
-        cost = max(1.0, (self._run_length / length) ** 2)
-        if self._runs < cost:
+        cost = max(1.0, (self._counted_at / length) ** 2)
+        allowed = min(most - (known.grids if known is not None else 0), int(self._left / cost))
+        if allowed < 1:
             return known
-        settings = self._settings.replace(length=length)
-        usual, others = _usual_and_others(attempts(self._cloud, settings), settings)
-        tried = self._counted(usual if briefly else others if known is not None else chain(usual, others), cost)
+        if length not in self._begun:
+            settings = self._settings.replace(length=length)
+            self._begun[length] = (settings, attempts(self._cloud, settings), Hope(settings.cells))
+        settings, tried, hope = self._begun[length]
+        before = hope.runs
+        hope.allow(allowed)
+        grid, fault = None, known.fault if known is not None else None
         try:
-            grid = first_that_passes(self._cloud, settings, tried, progress=self._show(length))
-            trial = LengthTrial(length, grid)
+            grid = first_that_passes(self._cloud, settings, tried, hope=hope, progress=self._show(length))
             made = grid.settings or settings  # what one length needed to pass, the others will need too
             self._settings = self._settings.replace(
                 keep_rods=made.keep_rods,
@@ -124,21 +146,13 @@ class Advice:
                 sharp_edges=made.sharp_edges,
                 plain_body=made.plain_body,
             )
-        except FrontError as error:
-            trial = LengthTrial(length, None, error) if known is None else known
-        except LengthError as error:
-            trial = LengthTrial(length, None, FrontError(str(error)))
+        except (FrontError, LengthError, OneSidedError) as error:
+            fault = fault or (error if isinstance(error, FrontError) else FrontError(str(error)))
+        self._left -= cost * (hope.runs - before)
+        paused = hope.is_paused() and hope.runs > before
+        trial = LengthTrial(length, grid, None if grid is not None else fault, hope.runs, paused)
         self._found[length] = trial
-        (self._briefly.add if briefly or self._runs < cost else self._briefly.discard)(length)
         return trial
-
-    def _counted(self, tried: Iterable[Attempt], cost: float) -> Iterator[Attempt]:
-        """Yield attempts as long as quick runs are left, at least one."""
-        for number, attempt in enumerate(tried):
-            if number and self._runs < cost:
-                return
-            self._runs -= cost
-            yield attempt
 
     @property
     def settings(self) -> Settings:
@@ -147,9 +161,8 @@ class Advice:
 
     @property
     def tried(self) -> list[LengthTrial]:
-        """What came of the lengths that were tried by all that may give a grid, or that passed, the shortest first."""
-        known = (self._found[length] for length in sorted(self._found))
-        return [trial for trial in known if trial.passed or trial.length not in self._briefly]
+        """What came of the lengths that were tried, the shortest first."""
+        return [self._found[length] for length in sorted(self._found)]
 
     def suggest(self) -> float:
         """Return the length to take.
@@ -157,14 +170,15 @@ class Advice:
         It is the first of a ladder that passes with what is next above it, both without much of the scan lost; else of those that
         pass with what is next above them the one that loses least; else one that passes; else the usual length.
         """
+        self.is_spent = True
         low, high = length_range(self._cloud)
         both: dict[float, float] = {}  # length -> what is lost there or at the next above
-        for share, briefly in LADDER_OF_LENGTHS:
+        for share, most in LADDER_OF_LENGTHS:
             length = min(max(_two_digits(share * self._usual), low), high)
-            trial = self.try_length(length, briefly=briefly)
+            trial = self.try_length(length, most)
             if trial is None or not trial.passed:
                 continue
-            above = self.try_length(self.next_above(length), briefly=briefly)
+            above = self.try_length(self.next_above(length), most)
             if above is not None and above.passed:
                 both[length] = max(trial.lost, above.lost)
                 if both[length] <= MOST_LOST:
@@ -186,15 +200,15 @@ class Advice:
         lengths = {min(max(_two_digits(share * at), low), high) for share in (1.0, *NEARBY_LENGTHS)} - {length}
         if (sure := round_length(SURE_PER_SPACING * self._cloud.spacing, "up")) > length and sure < high:
             lengths.add(sure)
-        self._runs, self._run_length = RUNS_NEARBY, at
-        for briefly in (True, False):
+        self._count_at(at, MOST_TRIED)
+        for most in (A_FEW, SOME_MORE):
             for each in sorted(lengths, key=lambda other: (abs(np.log(other / length)), other)):
-                trial = self.try_length(each, briefly=briefly)
+                trial = self.try_length(each, most=most)
                 if trial is not None and trial.passed:
                     return trial.length
         if not min(lengths, default=at) <= self._usual <= max(lengths, default=at):  # then this is cheap, or worth it
-            self._runs, self._run_length = RUNS_USUAL, self._usual
-            trial = self.try_length(self._usual, briefly=True)
+            self._count_at(self._usual, TRIED_USUAL)
+            trial = self.try_length(self._usual, most=A_FEW)
             return trial.length if trial is not None and trial.passed else None
         return None
 
@@ -207,9 +221,13 @@ class Advice:
         return max(_two_digits(length / NEXT_LENGTH), min(length, length_range(self._cloud)[0]))
 
     def around(self, length: float) -> list[float]:
-        """Return the lengths of a table: one, the two below and the two above."""
+        """Try the lengths of a table, one grid each, and return them: one, the two below and the two above."""
         below, above = self.next_below(length), self.next_above(length)
-        return list(dict.fromkeys((self.next_below(below), below, length, above, self.next_above(above))))
+        table = list(dict.fromkeys((self.next_below(below), below, length, above, self.next_above(above))))
+        self._count_at(length, TRIED_AROUND)
+        for each in sorted(table, key=lambda other: (other < length, abs(np.log(other / length)))):
+            self.try_length(each, most=1)
+        return table
 
     def members(self, length: float) -> int:
         """Return about how many members a grid of a length has."""
@@ -232,21 +250,6 @@ class Advice:
                 self._progress(f"try {length:g}", share)
 
         return show
-
-
-def _usual_and_others(every: Iterator[Attempt], settings: Settings) -> tuple[Iterator[Attempt], Iterator[Attempt]]:
-    """Return the attempts with the samples and the method that were asked for, which come first, and those after them."""
-
-    def is_usual(one: Attempt) -> bool:
-        made = one.settings
-        return (made.box_size, made.method, made.smooth_scale) == (
-            settings.box_size,
-            settings.method,
-            settings.smooth_scale,
-        )
-
-    one, other = tee(every)
-    return takewhile(is_usual, one), dropwhile(is_usual, other)
 
 
 def _two_digits(length: float) -> float:

@@ -19,7 +19,8 @@ def advice_rows(advice: Advice, length: float, cloud: PointCloud) -> tuple[tuple
     """Return head and rows of a table: what comes of a member length, of those around it and of others that were tried."""
     radius, unit = advice.radius(), f" [{cloud.unit}]" if cloud.unit else ""
     rows: list[tuple[str, ...]] = []
-    trials = {each: advice.try_length(each) for each in advice.around(length)}
+    advice.try_length(length)
+    trials: dict[float, LengthTrial | None] = dict.fromkeys(advice.around(length))
     trials |= {trial.length: trial for trial in advice.tried}
     for each in sorted(trials):
         trial = trials[each]
@@ -41,7 +42,7 @@ def result_of(trial: LengthTrial | None) -> str:
     if trial is None:
         return "not tried"
     if trial.fault is not None:
-        return f"no grid passes: {_why(trial)}"
+        return f"{_no_grid(trial)}: {_why(trial)}"
     found = trial.grid.certificate if trial.grid is not None else None
     if found is None:
         return "passes"
@@ -60,6 +61,13 @@ def result_of(trial: LengthTrial | None) -> str:
     return ", ".join(said)
 
 
+def _no_grid(trial: LengthTrial) -> str:
+    """Say that no grid passes, or that those do not that were made."""
+    if not trial.paused:
+        return "no grid passes"
+    return f"none of the first {trial.grids} grids passes" if trial.grids > 1 else "the first grid does not pass"
+
+
 def _why(trial: LengthTrial) -> str:
     """Return the first faults of the grid that came out, or why none did."""
     grid = getattr(trial.fault, "grid", None)
@@ -70,7 +78,8 @@ def _why(trial: LengthTrial) -> str:
 
 def advice_lines(advice: Advice, length: float, cloud: PointCloud) -> list[str]:
     """Return how noisy and how bent the scan is, which lengths pass, and which to take."""
-    unit, radius, trial = f" {cloud.unit}" if cloud.unit else "", advice.radius(), advice.try_length(length)
+    unit, radius = f" {cloud.unit}" if cloud.unit else "", advice.radius()
+    trial = next((each for each in advice.tried if each.length == length), None)
     bent = (
         f"R = {words_of_number(radius, 3)}{unit}: 95 % of the scan is bent less"
         if np.isfinite(radius)
@@ -84,7 +93,7 @@ def advice_lines(advice: Advice, length: float, cloud: PointCloud) -> list[str]:
     if trial is not None and not trial.passed:
         where = trial.fault.where if trial.fault is not None else None
         place = "" if where is None else f" (near {words_of_place(where)})"
-        near = advice.nearby(length)
+        near = None if advice.is_spent else advice.nearby(length)
         lines += [f"at {length:g}{unit}: no grid passes: {_why(trial)}{place}"]
         lines += [f"try --length {near:g}" if near else "no length passes of those tried; clean or crop the scan first"]
     else:

@@ -99,6 +99,12 @@ class MemberSettings(_Checked):
         "what the rows of quads follow inside: the boundary, or the directions of least and greatest curvature",
         choices=ROW_GUIDES,
     )
+    rows_along: Sequence[float] = _setting(
+        (),
+        "an arrow along which rows of members run, as six numbers: a place on the scan and a direction, x y z dx dy dz; one"
+        " lattice is laid out instead of several (default method, triangles, one length)",
+        unit="scan unit",
+    )
     planar: bool = _setting(
         False, "make quads or hexagons planar, as far as nodes within a tenth of a member of the scan allow it"
     )

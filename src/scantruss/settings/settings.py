@@ -25,6 +25,7 @@ from .records import (
 )
 from .values import (
     CURVATURE,
+    check_arrow,
     check_length_field,
     check_line,
     check_names,
@@ -72,6 +73,9 @@ class Settings(
         super().__post_init__()
         if self.cells != "quad" and self.rows != "boundary":
             raise InputError(f"rows {self.rows} needs cells quad, got {self.cells}")
+        object.__setattr__(self, "rows_along", check_arrow(self.rows_along))
+        if self.rows_along and (self.cells != "triangle" or self.method != "default" or self.length_field):
+            raise InputError("rows_along needs cells triangle, method default and one length everywhere")
         if self.planar and self.cells == "triangle":
             raise InputError("planar needs cells quad or hexagon; triangles always are")
         object.__setattr__(self, "fixed", check_positions(self.fixed))

@@ -52,6 +52,18 @@ def check_ring(ring: Any) -> tuple[tuple[float, ...], ...]:
     return points
 
 
+def check_arrow(given: Any) -> tuple[float, ...]:
+    """Return an arrow as a place and a direction, six finite numbers, or none at all, or refuse it."""
+    refusal = f"rows_along must be six numbers, a place and a direction, x y z dx dy dz, got {given!r}"
+    try:
+        arrow = tuple(float(number) for number in given or ())
+    except (TypeError, ValueError):
+        raise InputError(refusal) from None
+    if arrow and (len(arrow) != 6 or not all(map(math.isfinite, arrow)) or not any(arrow[3:])):
+        raise InputError(refusal)
+    return arrow
+
+
 def check_names(given: Any, count: int) -> tuple[str, ...]:
     """Return the names of so many fixed lines, or none at all, or refuse them."""
     if isinstance(given, str) or not all(isinstance(name, str) and name.strip() for name in given):

@@ -45,6 +45,10 @@ def structure_figures(state: StudioState) -> list[tuple[str, str]]:
         ("axial forces", f"{values['force_min'] / 1e3:.4g} to {values['force_max'] / 1e3:.4g} kN"),
         ("mass without nodes", f"{report.truss.mass:,.0f} kg"),
     ]
+    if report.rounds:
+        rows.append(("sections", " ".join(values["sections"])))
+    if report.buckling is not None and len(report.buckling.values):
+        rows.append(("lowest buckling factor", f"{report.buckling.values[0]:.3g}, {report.buckling.of}"))
     if report.vibration is not None and len(report.vibration.values):
         rows.append(("lowest frequency", f"{report.vibration.values[0]:.3g} Hz"))
     return rows

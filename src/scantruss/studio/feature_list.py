@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 MOST_LISTED = 40  #: holes and ridges with a box of their own
 ON_COLORS = {True: (0, 110, 180), False: (150, 60, 160)}  #: of holes that stay open; of ridges that are followed
 OFF_COLOR = (160, 160, 160)
+SWITCH_MODE = "switch hole or ridge"
 FEATURE_WIDTH = 6.0  #: of a hole or ridge that is drawn [pixel]
 
 
@@ -30,6 +31,7 @@ class FeatureList:
         self._boxes: list[Any] = []
         self._drawn: tuple[list[Feature], frozenset[int]] = ([], frozenset())
         self.shown.on_update(view.step(self._find))
+        view.modes[SWITCH_MODE] = self.clicked
 
     def _find(self) -> None:
         if self.shown.value:

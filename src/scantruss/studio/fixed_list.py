@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import re
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import InputError
-from ..surface.samples import sample_surface
+from .drawn_lines import ScannedPoints, numbers_of
 from .frame import SceneFrame
 from .picking import nearest_point
 
@@ -19,6 +18,8 @@ if TYPE_CHECKING:
 FIXED_COLOR = np.array((230, 97, 1), np.uint8)
 FIXED_RADIUS = 0.1  #: of a fixed node that is drawn [scene]
 NONE_CHOSEN = "-"
+FIX_MODE = "place fixed node"
+FIX_WAYS = ("Add", "Move", "Delete")
 
 
 class FixedNodes:
@@ -26,15 +27,21 @@ class FixedNodes:
 
     def __init__(self, view: StudioView, gui: Any) -> None:
         self.view = view
-        gui.add_markdown('Set "a click" to "place fixed node" and click on the scan, or type coordinates.')
+        by_click = gui.add_button("Place by clicks", hint="then click on the scan")
         self.chosen = gui.add_dropdown("node", (NONE_CHOSEN,))
         self.words = gui.add_text("x, y, z", "", hint="in the frame of the scan, in its unit")
-        add, move, delete = gui.add_button("Add"), gui.add_button("Move there"), gui.add_button("Delete")
+        ways = gui.add_button_group("typed", FIX_WAYS, hint="Add x, y, z, or move the chosen node there")
         self._handle: Any = None
+        by_click.on_click(view.step(lambda: setattr(view.click, "value", FIX_MODE)))
+        view.modes[FIX_MODE] = self.place
         self.chosen.on_update(view.step(self._choose))
-        add.on_click(view.step(lambda: self._set(self._typed(), len(self._fixed))))
-        move.on_click(view.step(lambda: self._set(self._typed(), self._number())))
-        delete.on_click(view.step(self._delete))
+        ways.on_click(view.step(lambda: self._do(ways.value)))
+
+    def _do(self, way: str) -> None:
+        if way == FIX_WAYS[2]:
+            self._delete()
+        else:
+            self._set(self._typed(), len(self._fixed) if way == FIX_WAYS[0] else self._number())
 
     @property
     def _fixed(self) -> tuple[tuple[float, ...], ...]:
@@ -46,11 +53,7 @@ class FixedNodes:
         return int(self.chosen.value.partition(":")[0]) - 1
 
     def _typed(self) -> tuple[float, ...]:
-        words = [word for word in re.split(r"[,;\s]+", self.words.value.strip()) if word]
-        try:
-            x, y, z = map(float, words)
-        except ValueError:
-            raise InputError(f"a fixed node needs three numbers x, y, z, got {self.words.value!r}") from None
+        x, y, z = numbers_of(self.words.value, 3, "a fixed node needs three numbers x, y, z")
         return x, y, z
 
     def _set(self, place: tuple[float, ...], number: int) -> None:
@@ -70,17 +73,17 @@ class FixedNodes:
         if len(places) and (there := nearest_point(places, origin, ahead)) is not None:
             self._show(there)
             return
-        scanned = self._scanned()
-        found = nearest_point(frame.to_scene(scanned), origin, ahead)
+        scanned = self._scanned().places
+        found = nearest_point(frame.to_scene(scanned), origin, ahead, self.view.near)
         if found is None:
             raise InputError("no point of the scan is there; click on the scan")
         self._set(tuple(scanned[found].tolist()), len(self._fixed))
 
-    def _scanned(self) -> np.ndarray:
-        """Return the points of the scan that are no outliers (N, 3), in its own frame [scan unit]."""
-        cloud = self.view.session.cloud
-        assert cloud is not None
-        return sample_surface(cloud, self.view.session.settings).measured_points + cloud.origin
+    def _scanned(self) -> ScannedPoints:
+        session = self.view.session
+        if session.cloud is None:
+            raise InputError("there is no scan yet; open one")
+        return ScannedPoints.of(session.cloud, session.settings)
 
     def _choose(self) -> None:
         self._show(self._number() if self.chosen.value != NONE_CHOSEN else -1)
@@ -109,9 +112,7 @@ class FixedNodes:
 
     def _drop(self, at: np.ndarray, number: int) -> None:
         """Move a fixed node to the point of the scan that is nearest to where it was dropped."""
-        scanned = self._scanned()
-        away = np.linalg.norm(scanned - self.view.frame.from_scene(at), axis=1)
-        self._set(tuple(scanned[int(away.argmin())].tolist()), number)
+        self._set(tuple(self._scanned().nearest(self.view.frame.from_scene(at)).tolist()), number)
 
     def fill(self, before: StudioState | None, state: StudioState) -> None:
         """Show the fixed nodes of a state."""

@@ -5,7 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
+
+from ..errors import ScanTrussError
 from ..scan.cloud import PointCloud
+from ..scan.formats.reading import read_content
 from ..scan.stream.fit import read_to_fit, spacing_to_fit, spacing_to_look
 from ..settings import Settings
 
@@ -23,6 +27,17 @@ def read_whole(path: Path) -> PointCloud:
         settings = settings.replace(thin_spacing=spacing_to_look(path, settings))
     cloud, _ = read_to_fit(path, settings)
     return cloud
+
+
+def classes_of(path: Path, cloud: PointCloud) -> np.ndarray | None:
+    """Return the classes of the points of a scan (N,), None where its file has none or some of its points were left out."""
+    if path.suffix.lower() not in (".las", ".laz"):
+        return None
+    try:
+        found = read_content(path, ("class",)).attributes.get("class")
+    except ScanTrussError:  # several files, or one that is read otherwise
+        return None
+    return found if found is not None and len(found) == len(cloud.points) and len(np.unique(found)) > 1 else None
 
 
 def next_free(place: Path, is_taken: Callable[[Path], bool] = lambda other: False) -> Path:

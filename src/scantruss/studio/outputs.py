@@ -10,9 +10,12 @@ from ..errors import InputError
 from ..export.formats import STRUCTURE, check_output, check_unit, model_of, suffixes_of, write
 from ..export.model import Model
 from ..runtime.files import temporary_folder
+from ..settings import Settings
 from ..structure.options import settings_text
 from .project import save_project
 from .state import StudioState
+
+CLEANED = "clean.ply"  # the scan without the points that were removed
 
 
 def model_to_show(state: StudioState, kind: str) -> Model:
@@ -65,9 +68,15 @@ def project_file(state: StudioState, place: Path | None) -> dict[str, bytes]:
         return {name: (folder / name).read_bytes()}
 
 
+def _of_the_file(state: StudioState) -> Settings:
+    """Return the settings that make the grid from the file that is read: a cleaned one holds the chosen points only."""
+    made = state.settings if state.grid is None or state.asked is None else state.asked
+    return made if state.cleaning is None else made.replace(classes=(), crop=())
+
+
 def settings_files(state: StudioState) -> dict[str, bytes]:
     """Return the settings of the grid, and of the structure, where there is one, as the command line reads them."""
-    made = state.settings if state.grid is None or state.asked is None else state.asked
+    made = _of_the_file(state)
     files = {"grid.settings.json": (json.dumps(made.to_dict(), indent=1, ensure_ascii=False) + "\n").encode()}
     if state.solution is not None:
         files["structure.toml"] = settings_text(state.structure_settings).encode()
@@ -77,8 +86,14 @@ def settings_files(state: StudioState) -> dict[str, bytes]:
 def command_of(state: StudioState) -> str:
     """Return the command lines that repeat the grid and the structure with the files of `settings_files`."""
     name = Path(state.cloud.name).name if state.cloud is not None and state.cloud.name else "SCAN"
-    made = state.settings if state.grid is None or state.asked is None else state.asked
-    lines = [
+    made, lines = _of_the_file(state), []
+    if state.cleaning is not None:
+        chosen = state.settings
+        taken = ["--class", ",".join(map(str, chosen.classes))] if chosen.classes else []
+        taken += [word for part in chosen.crop for word in ("--crop", part)]
+        lines.append(shlex.join(["scantruss", "clean", name, CLEANED, *taken, *state.cleaning.options]))
+        name = CLEANED
+    lines += [
         shlex.join(["scantruss", "grid", name, "grid.json", "--settings", "grid.settings.json"]),
         f"# grid.settings.json: --length {made.length:g} --effort {made.effort} and all else",
     ]

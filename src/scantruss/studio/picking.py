@@ -15,14 +15,22 @@ def along_and_off(places: np.ndarray, origin: np.ndarray, ahead: np.ndarray) -> 
     return depth, np.where(depth > 0, off / np.maximum(depth, 1e-12), np.inf)
 
 
-def nearest_point(places: np.ndarray, origin: np.ndarray, ahead: np.ndarray) -> int | None:
+def nearest_point(places: np.ndarray, origin: np.ndarray, ahead: np.ndarray, near: float = NEAR_ENOUGH) -> int | None:
     """Return which of some points (N, 3) a ray from `origin` (3,) in direction `ahead` (3,) hits first; None if it hits none."""
     depth, off = along_and_off(places, origin, ahead)
-    hit = off < NEAR_ENOUGH
+    hit = off < near
     if not hit.any():
         return None
     front = depth < depth[hit].min() * (1.0 + SAME_DEPTH)
     return int(np.where(hit & front, off, np.inf).argmin())
+
+
+def place_on_scan(
+    places: np.ndarray, origin: np.ndarray, ahead: np.ndarray, near: float = NEAR_ENOUGH
+) -> np.ndarray | None:
+    """Return the point (3,) of a scan (N, 3) that a ray hits first; None if it hits none."""
+    found = nearest_point(places, origin, ahead, near)
+    return None if found is None else np.asarray(places[found], float)
 
 
 def nearest_member(ends: np.ndarray, origin: np.ndarray, ahead: np.ndarray) -> tuple[int, float] | None:

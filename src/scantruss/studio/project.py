@@ -22,10 +22,12 @@ from ..scan.cloud import PointCloud
 from ..settings import Settings
 from ..structure.options import StructureSettings, read_structure_settings, settings_text
 from ..structure.statics import Solution
+from .scan_parts import Cleaning, WholeScan, part_of_scan
 from .state import Design, StudioState
 
-PROJECT_FORMAT, PROJECT_VERSION = "scantruss-project", 2
-PROJECT_PARTS = ("made_by.npy", "project.json", "scan.npz", "structure.toml", "grid.json", "structure.json")
+PROJECT_FORMAT, PROJECT_VERSION = "scantruss-project", 3
+PROJECT_PARTS = ("made_by.npy", "project.json", "scan.npz", "removed.npy", "structure.toml", "grid.json",
+                 "structure.json")  # fmt: skip
 FIXED_DATE = (1980, 1, 1, 0, 0, 0)  # the same project gives the same bytes
 Part = TypeVar("Part")
 LARGEST_PART = 8_000_000_000  #: of what is unpacked [bytes]
@@ -39,13 +41,15 @@ def save_project(path: Path, state: StudioState) -> None:
     FormatError
         It cannot be written; the one before is left as it was.
     """
-    cloud = state.cloud
-    assert cloud is not None
+    assert state.cloud is not None
+    whole = state.whole or WholeScan(state.cloud)
+    cloud, cleaning = whole.cloud, state.cleaning
     solved = state.grid is not None and state.solution is not None
     head = {
         "format": PROJECT_FORMAT, "format_version": PROJECT_VERSION, "made_by": MARK,
         "scan": {"unit": cloud.unit, "system": cloud.system, "name": Path(cloud.name).name, "dropped": cloud.dropped,
                  "notes": list(cloud.notes), "left_out": [list(part) for part in cloud.left_out]},
+        "cleaning": None if cleaning is None else [cleaning.outlier_distance, cleaning.loose_pieces],
         "settings": state.settings.to_dict(), "solved": solved, "quick": state.is_live,
         "asked": None if state.asked is None else state.asked.to_dict(),
         "designs": [{"name": each.name, "figures": [list(row) for row in each.figures]} for each in state.designs],
@@ -53,9 +57,11 @@ def save_project(path: Path, state: StudioState) -> None:
     parts = {
         "made_by.npy": _npy(np.array(MARK)),
         "project.json": (json.dumps(head, indent=1, ensure_ascii=False) + "\n").encode(),
-        "scan.npz": _kept(_SCANS, cloud, _encode_scan),
+        "scan.npz": _kept(_SCANS, whole, _encode_scan),
         "structure.toml": settings_text(state.structure_settings).encode(),
     }
+    if cleaning is not None:
+        parts["removed.npy"] = _npy(np.packbits(cleaning.removes))
     if state.grid is not None:
         parts["grid.json"] = _kept(_GRIDS, state.grid, encode_json)
     if solved and state.solution is not None:
@@ -66,7 +72,7 @@ def save_project(path: Path, state: StudioState) -> None:
     write_files({path: _zipped(parts, zipfile.ZIP_DEFLATED, stored=("scan.npz",))})
 
 
-_SCANS: weakref.WeakKeyDictionary[PointCloud, bytes] = weakref.WeakKeyDictionary()
+_SCANS: weakref.WeakKeyDictionary[WholeScan, bytes] = weakref.WeakKeyDictionary()
 _GRIDS: weakref.WeakKeyDictionary[Grid, bytes] = weakref.WeakKeyDictionary()
 _STRUCTURES: weakref.WeakKeyDictionary[Solution, bytes] = weakref.WeakKeyDictionary()
 
@@ -78,10 +84,13 @@ def _kept(known: weakref.WeakKeyDictionary[Part, bytes], part: Part, encode: Cal
     return content
 
 
-def _encode_scan(cloud: PointCloud) -> bytes:
+def _encode_scan(whole: WholeScan) -> bytes:
+    cloud = whole.cloud
     arrays = {"points": cloud.points, "origin": np.asarray(cloud.origin, np.float64)}
     if cloud.normals is not None:
         arrays["normals"] = cloud.normals
+    if whole.classes is not None:
+        arrays["classes"] = whole.classes
     return _zipped({f"{name}.npy": _npy(array) for name, array in arrays.items()}, zipfile.ZIP_DEFLATED)
 
 
@@ -127,13 +136,19 @@ def _project_of(parts: dict[str, bytes]) -> tuple[StudioState, bool]:
             dropped=int(scan["dropped"]), notes=tuple(scan["notes"]),
             left_out=tuple((str(why), int(count)) for why, count in scan["left_out"]),
         )  # fmt: skip
+        classes = np.asarray(arrays["classes"]) if "classes" in arrays else None
     if not len(cloud.points) or not np.isfinite(cloud.points).all():
         raise ValueError("points must be numbers")
     grid = _grid_of(parts["grid.json"]) if "grid.json" in parts else None
-    asked = head.get("asked")
+    asked, settings = head.get("asked"), Settings.from_dict(head["settings"])
+    whole, cleaning = WholeScan(cloud, classes), None
+    part = part_of_scan(whole, settings)
+    if (numbers := head.get("cleaning")) is not None:
+        removes = np.unpackbits(np.load(io.BytesIO(parts["removed.npy"]), allow_pickle=False), count=len(part.points))
+        cleaning = Cleaning(float(numbers[0]), float(numbers[1]), removes.astype(np.bool_))
     state = StudioState(
-        cloud,
-        Settings.from_dict(head["settings"]),
+        part_of_scan(whole, settings, cleaning),
+        settings,
         grid,
         None if asked is None else Settings.from_dict(asked),
         bool(head.get("quick", False)) and grid is not None,
@@ -142,6 +157,8 @@ def _project_of(parts: dict[str, bytes]) -> tuple[StudioState, bool]:
             Design(each["name"], _grid_of(parts[f"design-{k}.json"]), tuple((a, b) for a, b in each["figures"]))
             for k, each in enumerate(head.get("designs", ()), 1)
         ),
+        whole=whole,
+        cleaning=cleaning,
     )
     return state, bool(head["solved"]) and grid is not None
 

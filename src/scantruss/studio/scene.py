@@ -102,6 +102,10 @@ class Scene:
             return
         self.api.add_point_cloud(name, places, colors, point_size=size, point_shape="circle", precision="float32")
 
+    def thinned(self, name: str, places: np.ndarray, color: np.ndarray) -> None:
+        """Draw the points of a scan (N, 3), thinned, in one colour."""
+        self.points(name, places[:: max(1, -(-len(places) // DRAWN_POINTS))], color, 0.02)
+
     def lines(self, name: str, ends: np.ndarray, colors: np.ndarray, width: float = LINE_WIDTH) -> None:
         """Draw segments (M, 2, 3) in colours (M, 3) or one."""
         if not len(ends):

@@ -1,232 +1,41 @@
-"""Session: the steps that change what a studio works on, each of which can be taken back; no browser is needed."""
+"""Session: all steps of a studio, from the scan to the files; no browser is needed."""
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from threading import RLock
 from typing import Any
 
 from ..errors import InputError
 from ..export.model import Model
-from ..grid.grid import Grid
 from ..pipeline import grid_from_cloud
-from ..runtime.files import temporary_folder
 from ..runtime.progress import Progress
 from ..scan.cloud import PointCloud
-from ..scan.member_length import exact_range, length_range, suggest_length
+from ..scan.member_length import exact_range
 from ..settings import Settings
 from ..structure.options import loads_of_words
-from ..structure.statics import Solution
 from .compare import kept_design
 from .features import Feature, find_features, switched_off
-from .opening import DATA_FOLDER, EXAMPLES, next_free, read_whole
 from .outputs import command_of, files_of, model_to_show
-from .project import read_project, save_project
+from .scan_steps import ScanSteps
 from .solving import check_words, solved_state
-from .state import History, StudioState
-from .worker import StoppedError, Worker, words_of
 
-LARGEST_UPLOAD = 500_000_000  #: of a scan that comes through the page [bytes]
 MOST_LIVE_MEMBERS = 60_000  #: of a quick grid that is made while the length changes
-STRUCTURE_WORDS = ("supports", "support_type", "section", "material", "loads")  #: what the page asks for
+STRUCTURE_WORDS = ("supports", "support_type", "section", "material", "loads", "size_by")  #: what the page asks for
+STRUCTURE_NUMBERS = ("scale", "size", "buckling", "frequencies")  #: and the numbers
 
 
-class Session:
-    """The state of a studio, and the steps that change it.
-
-    Parameters
-    ----------
-    project : Path, optional
-        File that is saved after each step.
-    folder : Path, optional
-        Where a scan that is opened gets a project file, if `project` is not given; none: nothing is saved.
-    """
+class Session(ScanSteps):
+    """The state of a studio, and the steps that change it; see `Steps`."""
 
     def __init__(self, project: Path | None = None, *, folder: Path | None = None) -> None:
-        self.place, self.folder = project, folder
-        self.state = StudioState()
-        self.history = History()
+        super().__init__(project, folder=folder)
         self.features: list[Feature] = []
         self.wants_features = False  #: whether holes and ridges are looked for after each grid
-        self.message = ""  #: why the last step was refused, in the words of the command line
-        self.stage, self.share = "", 0.0
-        self.worker = Worker(self._end, self._progress)
-        self._listeners: list[Callable[[], None]] = []
-        self._turn = 0  # counts what makes the result of a running task unwanted
         self._features_of: tuple[PointCloud, Settings] | None = None
-        self._lock, self._saving = RLock(), RLock()
 
-    @property
-    def cloud(self) -> PointCloud | None:
-        """The scan."""
-        return self.state.cloud
-
-    @property
-    def settings(self) -> Settings:
-        """Settings of the next grid."""
-        return self.state.settings
-
-    @property
-    def grid(self) -> Grid | None:
-        """The grid."""
-        return self.state.grid
-
-    @property
-    def solution(self) -> Solution | None:
-        """The structure, solved."""
-        return self.state.solution
-
-    # ---- who listens
-
-    def listen(self, tell: Callable[[], None]) -> Callable[[], None]:
-        """Call `tell`, from any thread, whenever something has changed; return what ends that."""
-        self._listeners.append(tell)
-        return lambda: self._listeners.remove(tell) if tell in self._listeners else None
-
-    def tell(self) -> None:
-        """Say that something has changed."""
-        for tell in list(self._listeners):
-            try:
-                tell()
-            except StoppedError:
-                raise
-            except Exception:  # of a page that has just closed; the others still hear of it
-                sys.excepthook(*sys.exc_info())
-
-    # ---- steps
-
-    def change(self, words: str, *, goes_on: bool = False, **changes: Any) -> None:
-        """Take a step that can be taken back.
-
-        Parameters
-        ----------
-        words : str
-            What undo would take back.
-        goes_on : bool
-            Whether it goes on with the step before, where that has the same words.
-        """
-        with self._lock:
-            self.history.note(words, self.state, goes_on=goes_on)
-            self.state = replace(self.state, **changes)
-        self.message = ""
-
-    def begin(self, state: StudioState) -> None:
-        """Begin with a state, with nothing to take back."""
-        with self._lock:
-            self.state, self.history, self._turn = state, History(), self._turn + 1
-
-    def undo(self) -> None:
-        """Take the last step back."""
-        self._go(self.history.undo)
-
-    def redo(self) -> None:
-        """Take the step again that was taken back last."""
-        self._go(self.history.redo)
-
-    def _go(self, way: Callable[[StudioState], StudioState | None]) -> None:
-        self.worker.stop()
-        with self._lock:
-            other = way(self.state)
-            if other is None:
-                return
-            self.state, self._turn, self.message = other, self._turn + 1, ""
-        self.save()
-        self._look_for_features()
-        self.tell()
-
-    # ---- the scan
-
-    def open(self, path: Path) -> None:
-        """Open a scan or a project.
-
-        Raises
-        ------
-        ScanTrussError
-            It cannot be read.
-        """
-        if path.suffix.lower() == ".scantruss":
-            state, solved = read_project(path)
-            self.begin(solved_state(state) if solved else state)
-            return
-        self._start(read_whole(path))
-
-    def open_upload(self, name: str, content: bytes) -> None:
-        """Open a scan or a project that came through the page, as a step of the worker."""
-
-        def read(progress: Progress) -> None:
-            if len(content) > LARGEST_UPLOAD:
-                raise InputError(
-                    f"a scan of more than {LARGEST_UPLOAD:,} bytes; name it on the command line: scantruss studio SCAN"
-                )
-            own = Path(name.replace("\\", "/")).name
-            progress("read", 0.1)
-            with temporary_folder() as folder:
-                path = folder / (own or "scan")
-                path.write_bytes(content)
-                if path.suffix.lower() == ".scantruss":
-                    state, solved = read_project(path)
-                    taken = solved_state(state) if solved else state
-                    self.change(f"open {own}", **vars(taken))
-                    self._saved_beside(own)
-                    return
-                cloud = read_whole(path)
-            self._start(replace(cloud, name=own))
-            self._make("quick", progress, live=True)
-
-        self.worker.ask(read)
-
-    def open_example(self, name: str) -> None:
-        """Open a bundled scan and make its quick grid, as a step of the worker."""
-        file, settings = EXAMPLES[name]
-
-        def read(progress: Progress) -> None:
-            self._start(read_whole(DATA_FOLDER / file), settings)
-            self._make("quick", progress, live=True)
-
-        self.worker.ask(read)
-
-    def _start(self, cloud: PointCloud, settings: Settings | None = None) -> None:
-        made = settings or Settings(length=suggest_length(cloud), unit=cloud.unit)
-        self.change(
-            f"open {cloud.name}", cloud=cloud, settings=made, grid=None, asked=None, is_live=False, solution=None, report=None
-        )  # fmt: skip
-        self._turn += 1
+    def _forget_features(self) -> None:
         self.features, self._features_of = [], None
-        self._saved_beside(cloud.name or "scan")
-
-    def _saved_beside(self, name: str) -> None:
-        """Choose a project file, where there is none yet, and save."""
-        if self.place is None and self.folder is not None:
-            place = self.folder / f"{Path(name).stem}.scantruss"
-            self.place = next_free(place) if place.exists() else place
-        self.save()
-
-    def set_unit(self, unit: str) -> None:
-        """Take the unit of the scan's coordinates; the grid of the scan without it is gone."""
-        self.stop()
-        cloud = None if self.cloud is None else replace(self.cloud, unit=unit, system="")
-        self._turn += 1
-        self.change(
-            "unit",
-            cloud=cloud,
-            settings=self.settings.replace(unit=unit),
-            grid=None,
-            asked=None,
-            solution=None,
-            report=None,
-        )
-        self.save()
-
-    def length_bounds(self) -> tuple[float, float]:
-        """Return the lengths that the slider offers: about the suggested one, within what the scan allows [scan unit]."""
-        if self.cloud is None:
-            return 0.5, 2.0
-        low, high = length_range(self.cloud)
-        wished = suggest_length(self.cloud)
-        return max(low, wished / 3), max(low, min(high, wished * 3))
 
     # ---- the grid
 
@@ -258,10 +67,6 @@ class Session:
     def generate(self) -> None:
         """Make the grid with the effort of the settings."""
         self.worker.ask(lambda progress: self._make(self.settings.effort, progress))
-
-    def stop(self) -> None:
-        """Stop what runs; the grid before it stays."""
-        self.worker.stop()
 
     def _make(self, effort: str, progress: Progress, *, live: bool = False) -> None:
         cloud, settings, turn = self.cloud, self.settings, self._turn
@@ -321,18 +126,18 @@ class Session:
 
     # ---- the structure
 
-    def set_structure(self, **words: str) -> None:
-        """Take what the page says of supports, section, material and loads.
+    def set_structure(self, **words: str | float) -> None:
+        """Take what the page says of supports, section, material, loads, sizing and modes.
 
         Raises
         ------
         InputError
             It names a file, which the page may not read, or cannot be used.
         """
-        check_words(words)
+        check_words({name: word for name, word in words.items() if isinstance(word, str)})
         given: dict[str, Any] = dict(words)
         if "loads" in given:
-            given["loads"] = loads_of_words(given["loads"])
+            given["loads"] = loads_of_words(str(given["loads"]))
         settings = self.state.structure_settings.replace(**given)
         if settings != self.state.structure_settings:
             self.change("structure", structure_settings=settings)
@@ -343,7 +148,7 @@ class Session:
         def run(progress: Progress) -> None:
             progress("structure", 0.1)
             turn = self._turn
-            solved = solved_state(self.state)
+            solved = solved_state(self.state, progress)
             if turn != self._turn or solved.grid is not self.grid:
                 return
             self.change("run", solution=solved.solution, report=solved.report)
@@ -378,22 +183,3 @@ class Session:
     def command(self) -> str:
         """Return the command lines that repeat the grid and the structure."""
         return command_of(self.state)
-
-    def save(self) -> None:
-        """Save the project, where there is a place for it: written beside it, then renamed."""
-        with self._saving:
-            if self.place is not None and self.cloud is not None:
-                save_project(self.place, self.state)
-
-    # ---- what the worker tells
-
-    def _progress(self, stage: str, share: float) -> None:
-        changed = stage != self.stage or abs(share - self.share) >= 0.02
-        self.stage, self.share = stage, share
-        if changed:
-            self.tell()
-
-    def _end(self, error: Exception | None) -> None:
-        self.stage, self.share = "", 0.0
-        self.message = "" if error is None else words_of(error)
-        self.tell()

@@ -7,8 +7,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from ..errors import InputError
-from ..structure.modes import vibration_modes
+from ..runtime.progress import Progress
+from ..structure.modes import vibration_modes, worst_buckling
 from ..structure.report import report_structure
+from ..structure.sizing import SizingRound, size_members, weight_curve
 from ..structure.statics import factor_stiffness, solve
 from ..structure.truss import Truss
 from ..structure.variants import truss_arguments
@@ -31,7 +33,11 @@ def check_words(words: Mapping[str, str]) -> None:
                 raise InputError(f"{name} names a file, {named}; files are read by the command line only")
 
 
-def solved_state(state: StudioState) -> StudioState:
+def _silent(stage: str, share: float) -> None:
+    """Say nothing."""
+
+
+def solved_state(state: StudioState, progress: Progress = _silent) -> StudioState:
     """Return a state with the structure of its grid, solved.
 
     Raises
@@ -43,7 +49,21 @@ def solved_state(state: StudioState) -> StudioState:
         raise InputError("there is no grid yet; press Generate")
     asked = state.structure_settings
     truss = Truss.from_grid(state.grid, **truss_arguments(asked))
+    rounds: list[SizingRound] = []
+    weights = None
+    if asked.size:
+        progress("sizing", 0.2)
+        plain, truss = truss, size_members(truss, asked.size, asked.checks, rounds, by=asked.size_by)
+        progress("weight curve", 0.4)
+        weights = weight_curve(plain, truss, asked.size, asked.checks, asked.size_by)
+    progress("structure", 0.6)
     factored = factor_stiffness(truss)
     solution = solve(truss, factored)
-    modes = vibration_modes(factored, asked.frequencies) if asked.frequencies else None
-    return replace(state, solution=solution, report=report_structure(solution, asked.checks, vibration=modes))
+    progress("modes", 0.8)
+    count = asked.buckling or int(asked.size > 0)  # a sized structure is one that does not buckle
+    buckling = worst_buckling(factored, solution, count) if count else None
+    vibration = vibration_modes(factored, asked.frequencies) if asked.frequencies else None
+    report = report_structure(
+        solution, asked.checks, buckling=buckling, vibration=vibration, rounds=rounds, weights=weights
+    )
+    return replace(state, solution=solution, report=report)

@@ -10,6 +10,7 @@ from ..settings import Settings
 from ..structure.options import StructureSettings
 from ..structure.report import StructureReport
 from ..structure.statics import Solution
+from .scan_parts import Cleaning, WholeScan
 
 MOST_UNDONE = 200  #: that can be taken back
 NO_LENGTH = Settings(length=1.0)  #: of a studio without a scan
@@ -38,6 +39,8 @@ class StudioState:
     solution: Solution | None = None
     report: StructureReport | None = None
     designs: tuple[Design, ...] = ()
+    whole: WholeScan | None = None  #: as it was opened; `cloud` is what is taken of it
+    cleaning: Cleaning | None = None  #: what was removed last
 
     @property
     def is_stale(self) -> bool:

@@ -29,18 +29,30 @@ class CompareTab:
         self.other = gui.add_dropdown(
             "beside", (NO_OTHER,), hint="a kept design, drawn beside the present one: one camera for both"
         )
-        self.distance = gui.add_checkbox("coloured by its distance from the present one", False)
+        self.over = gui.add_checkbox("over the present one", False, hint="in its place instead of beside it")
+        self.distance = gui.add_checkbox("colour by distance", False, hint="of its nodes from the present one")
         self.legend = gui.add_html("")
         drop = gui.add_button("Forget that design")
         self.table = gui.add_html("")
         keep.on_click(view.step(lambda: view.session.keep_design(self.name.value)))
         drop.on_click(view.step(self._drop))
         self.other.on_update(view.step(self._choose))
+        self.over.on_update(view.step(self._lay_over))
         self.distance.on_update(view.step(lambda: self._draw(view.session.state)))
 
     def _choose(self) -> None:
         self._draw(self.view.session.state)
-        self.view.overview(1 if self.other.value == NO_OTHER else 2)
+        self.view.overview(1 if self.other.value == NO_OTHER or self.over.value else 2)
+        self.view.look.draw()
+
+    def _lay_over(self) -> None:
+        self.distance.value = self.over.value
+        self._choose()
+
+    @property
+    def is_over(self) -> bool:
+        """Whether a design is drawn over the present one."""
+        return bool(self.over.value) and self.other.value != NO_OTHER
 
     def _drop(self) -> None:
         if self.other.value != NO_OTHER:
@@ -75,7 +87,8 @@ class CompareTab:
             scene.remove("/beside/members", "/beside/panels", "/beside/name")
             return
         frame = self.view.frame
-        nodes = frame.to_scene(chosen.grid.scan_nodes) + np.array([BESIDE_FIRST * DRAWN_EXTENT, 0.0, 0.0], np.float32)
+        aside = 0.0 if self.is_over else BESIDE_FIRST * DRAWN_EXTENT
+        nodes = frame.to_scene(chosen.grid.scan_nodes) + np.array([aside, 0.0, 0.0], np.float32)
         values = chosen.grid.lengths
         words = "member length"
         if self.distance.value and state.grid is not None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError
+from ..structure.groups import WAYS_TO_GROUP
 from ..structure.supports import HELD
 from .colours import colors_of, legend_of
 from .compare import structure_figures
@@ -21,11 +22,35 @@ if TYPE_CHECKING:
 SHOWN_DISPLACEMENT = 0.06  #: of the greatest displacement, as it is drawn first [extent of the scan]
 LOAD_ARROW = 0.08  #: of the greatest load [extent of the scan]
 SUPPORT_COLOR = np.array((20, 130, 60), np.uint8)
-LOAD_COLOR = (170, 30, 30)
+LOAD_COLOR = (225, 60, 40)
 SUPPORT_RADIUS = 0.09  #: of a support that is drawn [scene]
 ANIMATION_SECONDS, FRAME_SECONDS = 6.0, 0.08  #: of a mode that is shown [s]
 SWINGS = 3  #: of a mode while it is shown
 AS_BUILT = "as built"
+SUPPORT_MODE = "support"
+
+
+def scale_of_text(text: str) -> float:
+    """Return the number of "0.01" or "1:100"; a ValueError where it is none."""
+    first, colon, second = text.partition(":")
+    number = float(second) if colon else 1.0
+    if not number > 0:
+        raise ValueError
+    return float(first) / number
+
+
+def weight_bars(weights: dict[int, float]) -> str:
+    """Return the mass of a sized structure by the number of its sections as HTML bars."""
+    most = max(weights.values()) or 1.0
+    rows = "".join(
+        f'<tr><td>{count}</td><td style="width:60%"><div style="height:.8em;background:#3b6d8c;width:{100 * mass / most:.1f}%">'
+        f"</div></td><td>{mass:,.0f} kg</td></tr>"
+        for count, mass in sorted(weights.items())
+    )
+    return (
+        f'<table style="font-size:.85em;width:100%;padding:0 .6em"><caption style="text-align:left">mass by the most different'
+        f" sections</caption>{rows}</table>"
+    )
 
 
 class StructureTab:
@@ -42,8 +67,18 @@ class StructureTab:
             "material": gui.add_text("material", kept.material),
             "loads": gui.add_text("loads", ",".join(map(str, kept.loads)), hint="self,snow:1kN/m2,wind:0.8kN/m2:-0.7"),
         }
+        self.numbers = {"scale": gui.add_text("scale", "1", hint="of the structure to the grid")}
+        with gui.add_folder("Sizing and modes", expand_by_default=False):
+            self.numbers["size"] = gui.add_text(
+                "size", "0", hint="different sections that are chosen at most; 0: as above"
+            )
+            self.words["size_by"] = gui.add_dropdown(
+                "each section for", WAYS_TO_GROUP, initial_value=kept.size_by, hint="what gets a section of its own"
+            )
+            self.numbers["buckling"] = gui.add_text("buckling modes", "0", hint="of the combination that buckles first")
+            self.numbers["frequencies"] = gui.add_text("frequencies", str(kept.frequencies), hint="lowest natural ones")
         run = gui.add_button("Run", color="blue")
-        self.results = gui.add_markdown("")
+        self.results, self.weights = gui.add_markdown(""), gui.add_html("")
         self.case = gui.add_dropdown("shape under", (AS_BUILT,), hint="load cases, combinations and modes")
         self.factor = gui.add_text(
             "enlarged", "", hint="how many times displacements are drawn; empty: so that they are seen"
@@ -54,6 +89,7 @@ class StructureTab:
         run.on_click(view.step(self._run))
         animate.on_click(view.step(self._animate))
         self.case.on_update(view.step(self._choose))
+        view.modes[SUPPORT_MODE] = lambda origin, ahead: self.support(view.under(origin, ahead))
         for each in (self.factor, self.loads, self.supports):
             each.on_update(view.step(lambda: self._draw(view.session.state)))
 
@@ -67,13 +103,20 @@ class StructureTab:
         self.view.look.draw()
 
     def _run(self) -> None:
-        self.view.session.set_structure(**{name: each.value for name, each in self.words.items()})
+        numbers: dict[str, float] = {}
+        for name, each in self.numbers.items():
+            try:
+                numbers[name] = scale_of_text(each.value) if name == "scale" else int(each.value)
+            except ValueError:
+                needs = "a number or 1:100" if name == "scale" else "a whole number"
+                raise InputError(f"{each.label} needs {needs}, got {each.value!r}") from None
+        self.view.session.set_structure(**{name: each.value for name, each in self.words.items()}, **numbers)
         self.view.session.run_structure()
 
-    def support(self, found: tuple[str, int]) -> None:
+    def support(self, found: tuple[str, int] | None) -> None:
         """Hold the node under a click, or no longer."""
         shown = self.view.shown_model()
-        if shown is None or found[0] != "nodes":
+        if shown is None or found is None or found[0] != "nodes":
             raise InputError("no node is there; click on a node of the grid")
         mark = shown[0].node_marks[found[1]]
         words = [word for word in self.words["supports"].value.split("+") if word.strip()]
@@ -96,31 +139,43 @@ class StructureTab:
             for name in STRUCTURE_WORDS:
                 value = getattr(asked, name)
                 self.words[name].value = ",".join(map(str, value)) if name == "loads" else value
+            for name, each in self.numbers.items():
+                each.value = f"{getattr(asked, name):g}"
         if before is not None and before.solution is state.solution and before.grid is state.grid:
             return
         rows = [f"{name} **{value}**" for name, value in structure_figures(state)]
         if state.report is not None:
             rows += [f"**warning:** {words}" for words in state.report.warnings]
         self.results.content = "\n\n".join(rows)
+        weights = state.report.weights if state.report is not None else None
+        self.weights.content = weight_bars(weights) if weights else ""
         cases: tuple[str, ...] = (AS_BUILT,)
         if state.solution is not None:
             cases += tuple(result.name for result in state.solution.all_results())
-            vibration = state.report.vibration if state.report is not None else None
-            if vibration is not None:
-                cases += tuple(f"mode {k}, {value:.3g} Hz" for k, value in enumerate(vibration.values.tolist(), 1))
+            cases += tuple(self._shapes(state))
         self.case.options = cases
         self.view.scene.remove("/supports/chosen")
         self._draw(state)
+
+    def _shapes(self, state: StudioState) -> dict[str, np.ndarray]:
+        """Return the shapes (V, 3) of buckling and vibration by their names."""
+        found: dict[str, np.ndarray] = {}
+        report = state.report
+        if report is not None and report.buckling is not None:
+            values = enumerate(report.buckling.values.tolist())
+            found |= {f"buckling {k + 1}, factor {value:.3g}": report.buckling.shapes[k] for k, value in values}
+        if report is not None and report.vibration is not None:
+            values = enumerate(report.vibration.values.tolist())
+            found |= {f"mode {k + 1}, {value:.3g} Hz": report.vibration.shapes[k] for k, value in values}
+        return found
 
     def _moved(self, state: StudioState) -> tuple[np.ndarray, float, bool] | None:
         """Return displacements (V, 3) of the chosen case [m], how many times they are drawn, and whether it is a mode."""
         if state.solution is None or state.report is None or self.case.value == AS_BUILT:
             return None
-        is_mode = self.case.value.startswith("mode ") and state.report.vibration is not None
-        if is_mode and state.report.vibration is not None:
-            moved = state.report.vibration.shapes[int(self.case.value.split()[1].rstrip(",")) - 1]
-        else:
-            moved = state.solution[self.case.value].displacements[:, :3]
+        shapes = self._shapes(state)
+        is_mode = self.case.value in shapes
+        moved = shapes[self.case.value] if is_mode else state.solution[self.case.value].displacements[:, :3]
         extent = DRAWN_EXTENT / self.view.frame.factor * self.view.metres()
         usual = SHOWN_DISPLACEMENT * extent / (float(np.linalg.norm(moved, axis=1).max()) or 1.0)
         try:

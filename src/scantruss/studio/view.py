@@ -17,20 +17,27 @@ from ..structure.build import scale_of
 from .colours import SCAN_COLOURINGS
 from .frame import BESIDE_FIRST, DRAWN_EXTENT, SceneFrame
 from .outputs import model_to_show
-from .picking import pick
+from .picking import NEAR_ENOUGH, pick
 from .scene import Scene
 from .session import Session
 from .state import StudioState
 from .tab_compare import CompareTab
+from .tab_constraints import ConstraintsTab
 from .tab_design import DesignTab
-from .tab_files import FilesTab
-from .tab_look import LookTab
+from .tab_grid import GridTab
+from .tab_out import OutTab
+from .tab_scan import ScanTab
 from .tab_structure import StructureTab
 from .worker import words_of
 
+Click = Callable[[np.ndarray, np.ndarray], None]
+"""What a click does, with the origin (3,) and the direction (3,) of its ray in the scene."""
 SELECT = "select"
 NATURAL_VIEW = 0.65  #: of the camera, upright [rad]
-CLICKS = (SELECT, "place fixed node", "switch hole or ridge", "support")  #: what a click in the scene does
+PLAN_VIEW = 0.08  #: the same of a plan, seen from so far that heights hardly matter [rad]
+PLAN_FAR = 1.3  #: of the camera above a plan, so that all of it is seen [distance at which it fills the view]
+PANEL_WIDTH = 452  #: [pixel]
+STEPS = ("Generate", "Stop", "Undo", "Redo")
 
 
 class StudioView:
@@ -46,30 +53,39 @@ class StudioView:
             self.scene.scan(session.state, SCAN_COLOURINGS[0], None)
             self.overview()
             client.flush()
+        self.modes: dict[str, Click] = {SELECT: self._select_under}  #: what a click in the scene can do
         gui = client.gui
         with client.atomic():
             gui.main_panel.dock_right()
+            gui.main_panel.set_width(PANEL_WIDTH)
             gui.configure_theme(show_share_button=False, show_logo=False, control_width="large")
             self.message = gui.add_markdown("")
             self.progress = gui.add_progress_bar(0.0, visible=False)
             self.steps = gui.add_button_group(
-                "steps", ("Undo", "Redo"), hint="what undo and redo would take is said below"
+                "steps",
+                STEPS,
+                hint="Generate with the effort that Design says; what undo and redo would take is said above",
             )
-            self.click = gui.add_dropdown("a click", CLICKS, hint="what a click on the drawing does")
+            self.click = gui.add_dropdown("a click", (SELECT,), hint="what a click on the drawing does")
             self.row = gui.add_markdown("", visible=False)
             tabs = gui.add_tab_group()
+            with tabs.add_tab("Scan"):
+                self.scan = ScanTab(self, gui)
             with tabs.add_tab("Design"):
                 self.design = DesignTab(self, gui)
-            with tabs.add_tab("View"):
-                self.look = LookTab(self, gui)
-            with tabs.add_tab("Structure"):
-                self.structure = StructureTab(self, gui)
+            with tabs.add_tab("Constraints"):
+                self.constraints = ConstraintsTab(self, gui)
+            with tabs.add_tab("Grid"):
+                self.look = GridTab(self, gui)
             with tabs.add_tab("Compare"):
                 self.compare = CompareTab(self, gui)
-            with tabs.add_tab("Files"):
-                self.files = FilesTab(self, gui)
-        self.tabs = (self.design, self.structure, self.look, self.compare, self.files)
-        self.steps.on_click(self.step(self._take_back))
+            with tabs.add_tab("Structure"):
+                self.structure = StructureTab(self, gui)
+            with tabs.add_tab("Out"):
+                self.files = OutTab(self, gui)
+            self.click.options = self.clicks
+        self.tabs = (self.design, self.constraints, self.structure, self.look, self.scan, self.compare, self.files)
+        self.steps.on_click(self.step(lambda: self._step(self.steps.value)))
         client.scene.on_click()(self._clicked)
         self._end = session.listen(self.update)
         self.update()
@@ -101,29 +117,43 @@ class StudioView:
             self.session.message = "" if not self.session.stage else self.session.message
         self.update()
 
+    def do_quietly(self, step: Callable[[], None]) -> None:
+        """Take a step of which there are many a second; what is refused is said on the page."""
+        try:
+            step()
+        except Exception as error:  # the page goes on
+            self.session.message = words_of(error)
+            self.update()
+
     def say(self, words: str) -> None:
         """Say something in passing."""
         self.client.add_notification("ScanTruss", words, auto_close_seconds=6.0)
 
-    def _take_back(self) -> None:
-        (self.session.undo if self.steps.value == "Undo" else self.session.redo)()
+    def _step(self, name: str) -> None:
+        session = self.session
+        dict(zip(STEPS, (session.generate, session.stop, session.undo, session.redo), strict=True))[name]()
 
     # ---- clicks
+
+    @property
+    def clicks(self) -> tuple[str, ...]:
+        """What a click can do."""
+        return tuple(self.modes)
+
+    @property
+    def near(self) -> float:
+        """Largest angle between a click and what it hits, as seen by the present camera [rad]."""
+        return NEAR_ENOUGH * min(float(self.client.camera.fov) / NATURAL_VIEW, 1.0)
 
     def _clicked(self, event: Any) -> None:
         if self.session.cloud is None:
             return
         origin, ahead = np.array(event.ray_origin), np.array(event.ray_direction)
         ahead = ahead / np.linalg.norm(ahead)
-        way = self.click.value
-        if way == "place fixed node":
-            self.do(lambda: self.design.fixed.place(origin, ahead))
-        elif way == "switch hole or ridge":
-            self.do(lambda: self.design.features.clicked(origin, ahead))
-        elif (found := self.under(origin, ahead)) is not None:
-            self.do((lambda: self.structure.support(found)) if way == "support" else (lambda: self.select(*found)))
-        else:
-            self.do(lambda: self.select("", 0))
+        self.do(lambda: self.modes[self.click.value](origin, ahead))
+
+    def _select_under(self, origin: np.ndarray, ahead: np.ndarray) -> None:
+        self.select(*(self.under(origin, ahead) or ("", 0)))
 
     def under(self, origin: np.ndarray, ahead: np.ndarray) -> tuple[str, int] | None:
         """Return the node, member or panel under a ray."""
@@ -191,6 +221,14 @@ class StudioView:
         with self.client.atomic():
             self.client.camera.position = tuple(where + reach * np.array([0.5, -0.5, 0.7]))
             self.client.camera.look_at = tuple(where)
+
+    def plan(self) -> None:
+        """Look at the scan from above, as on a plan."""
+        high = PLAN_FAR * 0.5 * DRAWN_EXTENT / np.tan(0.5 * PLAN_VIEW)
+        with self.client.atomic():
+            self.client.camera.fov = PLAN_VIEW
+            self.client.camera.position = (0.0, -1e-3 * high, high)
+            self.client.camera.look_at = (0.0, 0.0, 0.0)
 
     def overview(self, designs: int = 1) -> None:
         """Move the camera so that all of the scan is seen, or of several designs side by side."""

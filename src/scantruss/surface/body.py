@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels.geometry.components import component_labels
+from ..kernels.surface.voxels import squares_across_rows, squares_in_rows
+from ..runtime.parallel import run_in_parts
 from .given_normals import GivenNormals
 from .linked_samples import Linked, link_samples
 
@@ -23,6 +25,8 @@ DistanceField = NDArray[np.float64]  # a value for each voxel
 VOXEL_SIZE = 1.0 / 6.0  # size of a voxel [member lengths]
 COARSEST_VOXEL = 0.25  # the same of a large scan [member lengths]
 MOST_VOXELS = 8_000_000
+PLANES_PER_THREAD = 16  # planes of voxels that a thread looks at, at least
+SURELY_BEYOND = 8  # distance as far as the depth in a body has to be known, where it is smoothed and compared [voxels]
 LIMB_RADIUS = (
     0.45  # of the ball that does not fit into a limb: three members round are a limb of radius 0.48 [member lengths]
 )
@@ -92,11 +96,11 @@ def opened_body(
     wall, at_gaps = np.zeros(lattice.shape, np.bool_), _at_gaps(found)
     for triangles in chain(_fans(found, length), _discs(found, at_gaps, length)):
         _mark(wall, triangles, lattice)
-    opened = _open_and_close(points, _enclosed(wall, lattice), lattice, length)
+    opened = _open_and_close(points, _enclosed(wall), lattice, length)
     if opened is None and (caps := _caps(found, at_gaps, length, float(wall.sum()) * lattice.size**2)):
         for triangles in caps:
             _mark(wall, triangles, lattice)
-        opened = _open_and_close(points, _enclosed(wall, lattice), lattice, length)
+        opened = _open_and_close(points, _enclosed(wall), lattice, length)
     return opened
 
 
@@ -205,56 +209,60 @@ def _mark(wall: Voxels, triangles: np.ndarray, lattice: _Lattice) -> None:
                 wall[tuple(np.rint(np.einsum("c,kci->ik", share, some)).astype(int))] = True
 
 
-def _enclosed(wall: Voxels, lattice: _Lattice) -> Voxels:
+def _enclosed(wall: Voxels) -> Voxels:
     """Return the voxels that cannot be reached from outside through a wall, those of the wall included."""
     from scipy import ndimage
 
-    label = ndimage.label(_distance(wall, lattice) > lattice.size)[0]
+    label = ndimage.label(~ndimage.binary_dilation(wall))[0]
     outside = label == label[0, 0, 0]
-    enclosed: Voxels = _distance(outside, lattice) > 1.5 * lattice.size  # a voxel's half, and the thickness of a wall
+    # farther from outside than 1.5 voxels: half of one, and the thickness of a wall
+    enclosed: Voxels = ~ndimage.binary_dilation(outside, ndimage.generate_binary_structure(3, 2))
     return enclosed
 
 
-def _distance(voxels: Voxels, lattice: _Lattice) -> DistanceField:
-    """Return the distance of each voxel from the nearest of some (X, Y, Z) [scan unit]; inf where there is none."""
-    from scipy import ndimage
-
-    if not voxels.any():
-        return np.full(lattice.shape, np.inf)
-    distance: DistanceField = ndimage.distance_transform_edt(~voxels)
+def _distance(voxels: Voxels, lattice: _Lattice, reach: float) -> DistanceField:
+    """Return the distance of each voxel from the nearest of some (X, Y, Z) [scan unit]; one beyond the reach where that is farther."""
+    far = int(np.ceil(reach / lattice.size))
+    rows, squares = np.empty(lattice.shape, np.int16), np.empty(lattice.shape, np.int16)
+    run_in_parts(lattice.shape[0], PLANES_PER_THREAD, squares_in_rows, voxels, far, rows)
+    run_in_parts(lattice.shape[0], PLANES_PER_THREAD, squares_across_rows, rows, False, far, squares)
+    run_in_parts(lattice.shape[0], PLANES_PER_THREAD, squares_across_rows, squares, True, far, rows)
+    distance: DistanceField = np.sqrt(rows, dtype=np.float64)
     distance *= lattice.size
     return distance
 
 
 def _beyond_ball(voxels: Voxels, radius: float, deep: float, lattice: _Lattice) -> Voxels:
     """Return the voxels that a ball within them does not reach, where they lie deeper than corners and edges, and what is around those."""
-    reached = _distance(_distance(~voxels, lattice) >= radius, lattice) - radius
+    reached = _distance(_distance(~voxels, lattice, radius) >= radius, lattice, radius + deep) - radius
     beyond = voxels & (reached > 0.0)
     far = beyond & (reached > deep)
     if not far.any():
         return far
-    near: Voxels = beyond & (_distance(far, lattice) < deep + 2.0 * lattice.size)
+    edge = deep + 2.0 * lattice.size
+    near: Voxels = beyond & (_distance(far, lattice, edge) < edge)
     return near
 
 
 def _open_and_close(points: np.ndarray, body: Voxels, lattice: _Lattice, length: float) -> OpenedBody | None:
-    """Return what becomes of points (N, 3) around a body; None where it loses too much or nothing changes."""
+    """Return what becomes of points (N, 3) around a body; None where it is all thinner than a limb, loses too much or nothing changes."""
     from scipy import ndimage
     from scipy.spatial import cKDTree
 
-    if not body.any():
+    if not (_distance(~body, lattice, LIMB_RADIUS * length) >= LIMB_RADIUS * length).any():  # pockets of an open sheet
         return None
     limbs = _beyond_ball(body, LIMB_RADIUS * length, DEPTH_OF_LIMBS * length, lattice)
     body = body & ~limbs
     slits = _beyond_ball(~body, SLIT_RADIUS * length, DEPTH_OF_LIMBS * length, lattice)
     body = body | slits
-    depth = _distance(~body, lattice) - _distance(body, lattice)  # positive inside
+    reach = SURELY_BEYOND * lattice.size
+    depth = _distance(~body, lattice, reach) - _distance(body, lattice, reach)  # positive inside
     depth -= 0.5 * lattice.size * np.sign(depth)
     at = lattice.of(points).T
     own = ndimage.map_coordinates(depth, at, order=1)
     slit = own > OFF_BODY * lattice.size
     slits[tuple(np.rint(at[:, slit]).astype(int))] = True  # those so narrow that the walls filled them
-    changed = _distance(limbs | slits, lattice)
+    changed = _distance(limbs | slits, lattice, max(length, reach))
     near = ndimage.map_coordinates(np.minimum(changed, length), at, order=1) < 2.0 * lattice.size
     limb = near & (own < -OFF_BODY * lattice.size)
     left = ~limb & ~slit

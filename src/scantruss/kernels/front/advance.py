@@ -52,6 +52,23 @@ STEPS_AROUND = 4  # in which the surface is followed around a bend
 NO_BEND = 0.8  # cosine between the normals before and behind a bend above which it is none
 GOOD_ENOUGH = 0.8  # quality with an existing node, as a share of the best possible, above which no new node is tried
 SEEN_FROM, SEEN_TO = 0.4, 1.1  # distances from a line between which the surface beside it is looked at [member lengths]
+PART_OF_ANGLE = 1.3  # most that one part of an angle of the front may be [radian]
+REFLEX_ANGLE = 3.6  # angle above which the front turns back at a node and the first part is 60 degrees [radian]
+FARTHEST_SAMPLE = 0.9  # distance from a new node to the nearest sample at which the scan has ended [member lengths]
+REGULAR_HEIGHT = 0.87  # height of a regular triangle [sides]
+HEIGHT_OF_LENGTH = 0.4  # distance from a segment at which the length of its triangle is looked up [member lengths]
+# how a new triangle is looked for: the value at strictness 1, and what strictness 0 adds to it
+AROUND_SEGMENT, FARTHER_AROUND_SEGMENT = 2.4, 0.8  # distance up to which nodes are considered [member lengths]
+WIDEST_CLOSED, WIDER_CLOSED = 2.2, 0.7  # widest angle that a triangle with a neighbour closes [radian]
+AROUND_IDEAL, FARTHER_AROUND_IDEAL = 0.75, 0.9  # distance of a node from the ideal point [member lengths]
+# least distance of a new node from the front, as a share of the setting: at strictness 0, what strictness 1 adds, and for both
+LOOSE_ROOM, STRICT_ROOM, ROOM_OF_NEW_NODE = 0.4, 0.6, 1.1
+ROOM_OF_CANDIDATE = 0.5  # the same for a candidate node
+WORTH_OF_FRONT_NODE, WORTH_OF_CANDIDATE = (
+    0.9,
+    0.95,
+)  # of the quality with a node of the front that is no neighbour, a candidate
+LEAST_QUALITY = 0.5  # quality at strictness 1 below which a triangle waits for a later round
 STEEP_SIDE = 0.6  # cosine of the angle between that side and the plane of its nodes below which the side is followed
 
 
@@ -61,11 +78,11 @@ def ideal_point(front: Front, s: int, alpha: float, beta: float, side: float) ->
     a, b = front.tail[s], front.head[s]
     pa, pb = row(front.nodes, a), row(front.nodes, b)
     ab = subtract(pb, pa)
-    at_a = min(alpha / max(1.0, math.floor(alpha * 3.0 / math.pi + 0.5)), 1.3)
-    at_b = min(beta / max(1.0, math.floor(beta * 3.0 / math.pi + 0.5)), 1.3)
-    if alpha > 3.6:
+    at_a = min(alpha / max(1.0, math.floor(alpha * 3.0 / math.pi + 0.5)), PART_OF_ANGLE)
+    at_b = min(beta / max(1.0, math.floor(beta * 3.0 / math.pi + 0.5)), PART_OF_ANGLE)
+    if alpha > REFLEX_ANGLE:
         at_a = math.pi / 3.0
-    if beta > 3.6:
+    if beta > REFLEX_ANGLE:
         at_b = math.pi / 3.0
     from_a = along(pa, side, turned(ab, row(front.normals, a), at_a))
     from_b = along(pb, side, turned((-ab[0], -ab[1], -ab[2]), row(front.normals, b), -at_b))
@@ -111,7 +128,7 @@ def propose_on_surface(surface: Surface, front: Front, s: int, place: Vector, pa
     gap = norm(subtract(row(surface.mean, near), foot))
     normal = patch_normal(patch, foot)
     propose_node(front, foot, normal, near, False)
-    return gap < 0.9 * surface.length * surface.field[near]
+    return gap < FARTHEST_SAMPLE * surface.length * surface.field[near]
 
 
 @kernel
@@ -157,7 +174,7 @@ def propose_around_bend(surface: Surface, front: Front, s: int, side: float, pat
     normal, sample = first, front.sample[a]
     ahead = unit(cross(first, ab))
     for _ in range(STEPS_AROUND):
-        place = along(place, 0.87 * side / STEPS_AROUND, ahead)
+        place = along(place, REGULAR_HEIGHT * side / STEPS_AROUND, ahead)
         if fit_patch(surface, patch, sample, place) < 3:
             return False
         place = onto_patch(patch, place)
@@ -181,16 +198,17 @@ def choose_by_quality(
     pa, pb = row(front.nodes, a), row(front.nodes, b)
     before, after = front.previous[s], front.next[s]
     c, d = front.tail[before], front.head[after]
-    near = near_nodes(surface, front, s, (2.4 + 0.8 * (1.0 - strict)) * length, length, found)
+    around_segment = (AROUND_SEGMENT + FARTHER_AROUND_SEGMENT * (1.0 - strict)) * length
+    near = near_nodes(surface, front, s, around_segment, length, found)
     alpha, beta = left_angle(front, s), right_angle(front, s)
     segment = norm(subtract(pb, pa))
     side = rules.length_weight * length + (1.0 - rules.length_weight) * segment
     place = ideal_point(front, s, alpha, beta, side)
     if front.count[LOOK_AT_EDGES] == 1 and front.on_boundary[a] and front.on_boundary[b]:
         place = beside_line(surface, front, s, place, length)
-    widest = 2.2 + 0.7 * (1.0 - strict)
-    around = (0.75 + 0.9 * (1.0 - strict)) * length
-    room = (0.4 + 0.6 * strict) * rules.nearness * length * 1.1
+    widest = WIDEST_CLOSED + WIDER_CLOSED * (1.0 - strict)
+    around = (AROUND_IDEAL + FARTHER_AROUND_IDEAL * (1.0 - strict)) * length
+    room = (LOOSE_ROOM + STRICT_ROOM * strict) * rules.nearness * length * ROOM_OF_NEW_NODE
     score = np.full(near + 1, -1.0)
     for i in range(near):
         q = found[i]
@@ -203,9 +221,9 @@ def choose_by_quality(
                 score[i] = value
         elif norm(subtract(pq, place)) < around:
             if front.out[q] >= 0:
-                score[i] = 0.9 * value
-            elif far_from_front(front, s, q, pq, found, near, 0.5 * rules.nearness * length, length):
-                score[i] = 0.95 * value  # a candidate node that the front has not reached yet
+                score[i] = WORTH_OF_FRONT_NODE * value
+            elif far_from_front(front, s, q, pq, found, near, ROOM_OF_CANDIDATE * rules.nearness * length, length):
+                score[i] = WORTH_OF_CANDIDATE * value  # a candidate node that the front has not reached yet
     enough = GOOD_ENOUGH * (rules.shape_weight + rules.size_weight)
     proposed = around_bend = False
     while True:  # each turn proposes one of two new nodes or takes a candidate out
@@ -220,7 +238,7 @@ def choose_by_quality(
                 if far_from_front(front, s, front.count[NODES], pp, found, near, room, length):
                     score[near] = quality(pa, pb, pp, side, rules.shape_weight, rules.size_weight)
             continue
-        if best < 0 or score[best] < 0.5 * strict:
+        if best < 0 or score[best] < LEAST_QUALITY * strict:
             if around_bend or not propose_around_bend(surface, front, s, side, patch):
                 return False
             around_bend = True
@@ -268,7 +286,7 @@ def rules_of_segment(surface: Surface, front: Front, s: int, rules: Rules) -> Ru
     a, b = front.tail[s], front.head[s]
     pa, pb = row(front.nodes, a), row(front.nodes, b)
     ab = subtract(pb, pa)
-    height = 0.4 * rules.desired * surface.field[front.sample[a]]
+    height = HEIGHT_OF_LENGTH * rules.desired * surface.field[front.sample[a]]
     place = along(along(pa, 0.5, ab), height, turned(ab, row(front.normals, a), 0.5 * math.pi))
     return rules_at(rules, rules.desired * length_at(surface, front.sample[a], place))
 

@@ -38,6 +38,11 @@ LEAST_DELTA = 0.3  # quality delta below which no triangle with an existing node
 SEARCH_REACH = 2.4  # distance from a segment up to which nodes of the front are considered [lengths]
 # least distance of a new node from a candidate node that the front has not reached yet [lengths]
 CANDIDATE_CLEARANCE = 0.45
+STEPS_AROUND_MERGED = (
+    2.0  # how far from their middle the point is looked for that two nodes become [steps between samples]
+)
+MARGIN_OF_SEARCH = 1.5  # how much farther than the search range the samples reach whose points are looked at
+WIDENED_SEARCH = 2.0  # by which a search range without points grows, once
 
 TRIANGLE, QUAD, BOTH, NEITHER, RIGHT, LEFT = 1, 2, 3, 4, 5, 6  # rules of the cases in Table 1
 
@@ -162,7 +167,7 @@ def merge_neighbors(surface: Surface, front: Front, s: int, rules: Rules, found:
         place = row(front.nodes, keep)
     else:
         sample = walk(surface, front.sample[c], middle)
-        count = flood(surface, sample, middle, 2.0 * surface.step)
+        count = flood(surface, sample, middle, STEPS_AROUND_MERGED * surface.step)
         least = 1e300
         for i in range(count):
             t = surface.queue[i]
@@ -269,7 +274,7 @@ def optimal_point(surface: Surface, front: Front, s: int, rules: Rules, patch: n
     extent = rules.search_range
     best, chosen, of = -1.0, -1, sample
     for _ in range(2):
-        count = flood(surface, sample, ideal, 1.5 * extent + surface.step)
+        count = flood(surface, sample, ideal, MARGIN_OF_SEARCH * extent + surface.step)
         for i in range(count):
             t = surface.queue[i]
             if dot(row(surface.normals, t), normal) < 0.0:
@@ -288,7 +293,7 @@ def optimal_point(surface: Surface, front: Front, s: int, rules: Rules, patch: n
                     best, chosen, of = value, p, t
         if chosen >= 0:
             break
-        extent *= 2.0
+        extent *= WIDENED_SEARCH
     if chosen < 0:
         return False
     place = row(surface.points, chosen)

@@ -28,6 +28,14 @@ FOLD_DISTANCE = 0.85
 FACING_COSINE = 0.5  # least cosine of the angle between such a line and the triangle
 SHEET_DISTANCE = 0.45  # distance from a triangle from which on another sheet begins [member lengths]
 FACES_AWAY = -0.5  # cosine between normals below which places near each other lie on two sides of a sharp edge
+# two nodes lie plainly on one sheet, or on two, by the cosine between their normals and the sine of the line between them
+ONE_SHEET_FACING, ONE_SHEET_SLOPE = 0.8, 0.3
+TWO_SHEETS_FACING, TWO_SHEETS_SLOPE = -0.5, 0.7
+# how far from their middle samples may link two nodes: a share of their distance, and steps between samples
+LINKED_WITHIN, LINKED_STEPS = 0.6, 1.5
+LOOSE_ALIGNMENT, STRICT_ALIGNMENT = -0.2, 0.5  # least cosine between a triangle and the surface; what strictness 1 adds
+LONGEST_EDGE, SHORTER_EDGE = 3.0, 1.2  # longest edge of a triangle; what strictness 1 takes off [member lengths]
+ROOM_BESIDE_EDGE = 0.25  # distance of a node of the front from a new edge at strictness 1 [member lengths]
 NO_SECTOR = 9.0  # stands for the angle of a node outside the unmeshed area; larger than a full turn [radian]
 
 
@@ -41,12 +49,12 @@ def same_sheet(surface: Surface, front: Front, a: int, q: int, length: float) ->
         return True
     flat = max(abs(dot(d, na)), abs(dot(d, nq))) / far
     facing = dot(na, nq)
-    if facing > 0.8 and flat < 0.3:
+    if facing > ONE_SHEET_FACING and flat < ONE_SHEET_SLOPE:
         return True
-    if facing < -0.5 and flat > 0.7:
+    if facing < TWO_SHEETS_FACING and flat > TWO_SHEETS_SLOPE:
         return False
     place = along(row(front.nodes, a), 0.5, d)
-    return linked(surface, front.sample[a], front.sample[q], place, 0.6 * far + 1.5 * surface.step)
+    return linked(surface, front.sample[a], front.sample[q], place, LINKED_WITHIN * far + LINKED_STEPS * surface.step)
 
 
 @kernel
@@ -135,12 +143,12 @@ def fits(front: Front, s: int, p: int, found: np.ndarray, near: int, length: flo
     pa, pb, pp = row(front.nodes, a), row(front.nodes, b), row(front.nodes, p)
     na, nb, np_ = row(front.normals, a), row(front.normals, b), row(front.normals, p)
     face = unit(cross(subtract(pb, pa), subtract(pp, pa)))
-    least = 0.5 * strict - 0.2
+    least = LOOSE_ALIGNMENT + STRICT_ALIGNMENT * strict
     if dot(face, na) <= least or dot(face, nb) <= least or dot(face, np_) <= least:
         return False, -1
     if not on_unmeshed_side(pa, pb, pp, unit((na[0] + nb[0], na[1] + nb[1], na[2] + nb[2]))):
         return False, -1
-    longest = (3.0 - 1.2 * strict) * length
+    longest = (LONGEST_EDGE - SHORTER_EDGE * strict) * length
     if norm(subtract(pp, pa)) > longest or norm(subtract(pp, pb)) > longest:
         return False, -1
     closes_left, closes_right = p == c, p == d
@@ -167,7 +175,7 @@ def fits(front: Front, s: int, p: int, found: np.ndarray, near: int, length: flo
             passage = passage_of(front, s, p)
             if passage < 0:
                 return False, -1
-    if not clear_of_front(front, s, p, pp, found, near, 0.25 * strict * length, length):
+    if not clear_of_front(front, s, p, pp, found, near, ROOM_BESIDE_EDGE * strict * length, length):
         return False, -1
     return True, passage
 

@@ -1,4 +1,4 @@
-"""Tab: how scan and grid are drawn: colours, histogram, section, pictures."""
+"""Tab: how the grid is drawn: colours, histogram, certificate, section, pictures."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ import numpy as np
 
 from ..errors import InputError
 from ..export.page_tables import PageColumn, colorings_of
-from .colours import DIMMED, SCAN_COLOURINGS, colors_of, histogram_of, legend_of, values_of
+from .certificate_list import CertificateList
+from .colours import DIMMED, colors_of, histogram_of, legend_of, values_of
 from .frame import SectionPlane
 from .scene import BALL_RADIUS, MOST_DRAWN_LINES, TUBE_RADIUS, cut, drawn_colors, plain_colors
 
@@ -25,8 +26,8 @@ TURN_FRAMES, TURN_MILLISECONDS = 36, 100  #: of a turntable, and how long each i
 PICTURE_PATIENCE = 120.0  #: how long the browser may take for a picture [s]
 
 
-class LookTab:
-    """What is drawn, in which colours."""
+class GridTab:
+    """What is drawn of the grid, in which colours."""
 
     def __init__(self, view: StudioView, gui: Any) -> None:
         self.view, step = view, view.step
@@ -38,14 +39,10 @@ class LookTab:
             "from, to", 0.0, 1.0, 0.01, (0.0, 1.0), hint="what lies between them stands out"
         )
         self.count = gui.add_markdown("")
-        self.scan_coloring = gui.add_dropdown("scan", SCAN_COLOURINGS)
-        self.scan_legend = gui.add_html("")
-        self.scan, self.members = gui.add_checkbox("draw scan", True), gui.add_checkbox("draw members", True)
-        self.panels, self.nodes = gui.add_checkbox("draw panels", True), gui.add_checkbox("draw nodes", False)
-        self.tubes, self.pins = (
-            gui.add_checkbox("as tubes and balls", False),
-            gui.add_checkbox("pins of the certificate", False),
-        )
+        self.members, self.panels = gui.add_checkbox("draw members", True), gui.add_checkbox("draw panels", True)
+        self.nodes, self.tubes = gui.add_checkbox("draw nodes", False), gui.add_checkbox("as tubes and balls", False)
+        with gui.add_folder("Certificate", expand_by_default=False):
+            self.certificate = CertificateList(view, gui)
         self.axis = gui.add_dropdown("section across", (WHOLE, "x", "y", "z"))
         self.at = gui.add_slider("section at", 0.0, 1.0, 0.01, 0.5)
         self.dark = gui.add_checkbox("dark page", False)
@@ -53,11 +50,8 @@ class LookTab:
         for each in (self.members, self.panels, self.nodes, self.tubes, self.axis, self.at, self.range):
             each.on_update(step(self.draw))
         self.coloring.on_update(step(lambda: self._chosen(view.session.state)))
-        for each in (self.scan, self.scan_coloring):
-            each.on_update(step(self.draw_scan))
         for each in (self.axis, self.at):
-            each.on_update(step(self.draw_scan))
-        self.pins.on_update(step(lambda: view.design._fill_grid(view.session.state, "")))
+            each.on_update(step(lambda: view.scan.draw()))
         self.tubes.on_update(step(lambda: view.scene.light(self.tubes.value)))
         self.dark.on_update(step(self._theme))
         picture.on_click(step(self._picture))
@@ -67,12 +61,7 @@ class LookTab:
 
     def fill(self, before: StudioState | None, state: StudioState) -> None:
         """Draw a state."""
-        if before is None or before.cloud is not state.cloud or before.grid is not state.grid:
-            if state.grid is not None and (before is None or before.grid is None):
-                self.scan.value = False  # it hides the grid
-            elif state.grid is None:
-                self.scan.value = True
-            self.draw_scan()
+        self.certificate.fill(before, state)
         if before is not None and before.grid is state.grid and before.solution is state.solution:
             return
         self.view.select("", 0)
@@ -121,16 +110,6 @@ class LookTab:
         ends = self.view.frame.to_scene(np.stack(cloud.bounds) + cloud.origin)[:, axis]
         return SectionPlane(axis, float(ends[0] + self.at.value * (ends[1] - ends[0])))
 
-    def draw_scan(self) -> None:
-        """Draw the scan."""
-        state = self.view.session.state
-        if state.cloud is None or not self.scan.value:
-            self.view.scene.remove_scan()
-            self.scan_legend.content = ""
-            return
-        scale = self.view.scene.scan(state, self.scan_coloring.value, self.section)
-        self.scan_legend.content = "" if scale is None else legend_of(scale[0], state.cloud.unit, *scale[1:], False)
-
     def draw(self) -> None:
         """Draw the grid or structure."""
         scene, shown = self.view.scene, self.view.shown_model()
@@ -162,6 +141,9 @@ class LookTab:
         if self.view.structure.is_moved:
             of_members = np.broadcast_to(DIMMED, of_members.shape)
             self.count.content = "grey as built, while the Structure tab shows a displaced shape"
+        elif self.view.compare.is_over:
+            of_members = np.broadcast_to(DIMMED, of_members.shape)
+            self.count.content = "grey, while Compare draws another design over it"
         ends, of_members = cut(section, places[model.members], of_members)
         lines, bodies = self.members.value and not self.tubes.value, self.members.value and self.tubes.value
         scene.members("/grid/members", ends if lines else ends[:0], of_members if lines else of_members[:0])

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from .view import StudioView
 
 
-class FilesTab:
+class OutTab:
     """Downloads."""
 
     def __init__(self, view: StudioView, gui: Any) -> None:

@@ -1,0 +1,149 @@
+"""Crop the scan: by a box with two handles, a polygon drawn on the plan, or words typed."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..selection import parts_of, polygon_text
+from .picking import place_on_scan
+
+if TYPE_CHECKING:
+    from .state import StudioState
+    from .view import StudioView
+
+CROP_COLOR = (200, 90, 0)
+OUTSIDE_COLOR = np.array((190, 190, 195), np.uint8)
+CROP_MODE = "corner of crop"
+BOX_EDGES = np.array([(0, 1), (0, 2), (0, 4), (1, 3), (1, 5), (2, 3), (2, 6), (3, 7), (4, 5), (4, 6), (5, 7), (6, 7)])
+CROP_WAYS = ("Box", "Polygon", "All")
+
+
+class CropTool:
+    """Chooses a part of space, draws it, and takes the points in it."""
+
+    def __init__(self, view: StudioView, gui: Any) -> None:
+        self.view = view
+        ways = gui.add_button_group(
+            "draw", CROP_WAYS, hint="a box with two handles; corners clicked on the plan; no crop at all"
+        )
+        self.words = gui.add_text(
+            "crop", "", hint="box:X0,Y0,Z0,X1,Y1,Z1, sphere:X,Y,Z,RADIUS or polygon:X,Y,X,Y,...; several with blanks"
+        )
+        take = gui.add_button("Crop", color="blue")
+        self._handles: list[Any] = []
+        self._corners: list[tuple[float, float]] = []
+        ways.on_click(view.step(lambda: {"Box": self._box, "Polygon": self._polygon, "All": self._all}[ways.value]()))
+        take.on_click(view.step(self._take))
+        view.modes[CROP_MODE] = self._corner
+
+    def _check(self) -> None:
+        if self.view.session.cloud is None:
+            raise InputError("there is no scan yet; open one")
+
+    def _all(self) -> None:
+        self._clear()
+        self.words.value = ""
+        self.view.session.crop(())
+
+    def _take(self) -> None:
+        self._check()
+        self.view.session.crop(tuple(self.words.value.split()))
+        self._clear()
+
+    def _clear(self) -> None:
+        """Draw nothing more of what was being chosen."""
+        for handle in self._handles:
+            handle.remove()
+        self._handles, self._corners = [], []
+        self.view.scene.remove("/crop", "/crop outside")
+        if self.view.click.value == CROP_MODE:
+            self.view.click.value = self.view.clicks[0]
+
+    # ---- box
+
+    def _box(self) -> None:
+        """Show a box around the scan, or the one that is typed, with a handle at its lowest and highest corner."""
+        self._check()
+        self._clear()
+        frame, whole = self.view.frame, self._whole()
+        low, high = frame.to_scene(np.stack([whole.min(axis=0), whole.max(axis=0)]))
+        for part in self.words.value.split():
+            if part.startswith("box:") and len(numbers := parts_of(part)[1][0][0]) == 6:
+                low, high = frame.to_scene(np.array(numbers).reshape(2, 3))
+        for name, at in (("low", low), ("high", high)):
+            handle = self.view.scene.api.add_transform_controls(
+                f"/crop {name}", scale=1.2, disable_rotations=True, depth_test=False, position=tuple(at.tolist())
+            )
+            handle.on_update(self._dragged)
+            self._handles.append(handle)
+        self._show_box()
+
+    def _dragged(self, event: Any) -> None:
+        self.view.do_quietly(partial(self._show_box, event.phase == "end"))
+
+    def _show_box(self, tells: bool = True) -> None:
+        ends = np.sort(np.array([handle.position for handle in self._handles]), axis=0)
+        corners = np.array([[ends[k >> axis & 1, axis] for axis in range(3)] for k in range(8)])
+        self.view.scene.lines("/crop", corners[BOX_EDGES], np.array(CROP_COLOR, np.uint8), 4.0)
+        if tells:
+            numbers = self.view.frame.from_scene(ends).ravel().tolist()
+            self.words.value = "box:" + ",".join(f"{number:.7g}" for number in numbers)
+            self._show_outside()
+
+    def _show_outside(self) -> None:
+        """Draw the points outside the present crop too, so that it can be made larger."""
+        taken, whole = self.view.session.cloud, self.view.session.state.whole
+        if taken is None or whole is None or whole.cloud is taken:
+            return
+        self.view.scene.thinned("/crop outside", self.view.frame.to_scene(self._whole()), OUTSIDE_COLOR)
+
+    def _whole(self) -> np.ndarray:
+        """Return the points of the scan as it was opened (N, 3), in its own frame [scan unit]."""
+        whole = self.view.session.state.whole
+        if whole is None:
+            raise InputError("there is no scan yet; open one")
+        points: np.ndarray = whole.cloud.points + whole.cloud.origin
+        return points
+
+    # ---- polygon
+
+    def _polygon(self) -> None:
+        """Look at the scan from above and take corners by clicks."""
+        self._check()
+        self._clear()
+        self.words.value = ""
+        self._show_outside()
+        self.view.plan()
+        self.view.click.value = CROP_MODE
+        self.view.say("click the corners of a polygon on the plan, then press Crop")
+
+    def _corner(self, origin: np.ndarray, ahead: np.ndarray) -> None:
+        """Take the place under a click for a corner: on the scan, or beside it at its middle height."""
+        frame = self.view.frame
+        at = place_on_scan(frame.to_scene(self._whole()), origin, ahead, self.view.near)
+        if at is None:
+            if abs(ahead[2]) < 1e-6:
+                raise InputError("no corner is there; look at the scan from above: press Polygon")
+            at = origin - ahead * (origin[2] / ahead[2])
+        x, y, _ = frame.from_scene(at).tolist()
+        self._corners.append((float(f"{x:.7g}"), float(f"{y:.7g}")))
+        places = np.array([(*corner, frame.middle[2]) for corner in self._corners])
+        height = float(frame.to_scene(self._whole())[:, 2].max())
+        drawn = frame.to_scene(places)
+        drawn[:, 2] = height
+        if len(drawn) > 1:
+            self.view.scene.chain("/crop", drawn, len(drawn) > 2, CROP_COLOR, 4.0)
+        else:
+            self.view.scene.points("/crop", drawn, np.array(CROP_COLOR, np.uint8), 0.12)
+        if len(self._corners) > 2:
+            self.words.value = polygon_text([self._corners])
+
+    def fill(self, before: StudioState | None, state: StudioState) -> None:
+        """Show the crop of a state."""
+        if before is None or before.settings.crop != state.settings.crop or before.whole is not state.whole:
+            self.words.value = " ".join(state.settings.crop)
+            self._clear()

@@ -1,0 +1,94 @@
+"""The direction of the rows: an arrow on the scan, drawn by two clicks, whose head is dragged by a handle."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import InputError
+from .drawn_lines import ScannedPoints, numbers_of
+from .frame import SceneFrame
+from .picking import nearest_point
+
+if TYPE_CHECKING:
+    from .state import StudioState
+    from .view import StudioView
+
+ROWS_MODE = "arrow of rows"
+ROWS_COLOR = (0, 110, 120)
+
+
+class RowsTool:
+    """Draws the arrow along which the rows of members run."""
+
+    def __init__(self, view: StudioView, gui: Any) -> None:
+        self.view = view
+        draw = gui.add_button("Draw an arrow", hint="then click two points of the scan; drag the handle at its head")
+        self.words = gui.add_text(
+            "arrow", "", hint="x, y, z, dx, dy, dz: a place on the scan and a direction; empty: none"
+        )
+        none = gui.add_button("No arrow")
+        self._begin: np.ndarray | None = None
+        self._handle: Any = None
+        draw.on_click(view.step(self._start))
+        none.on_click(view.step(lambda: view.session.set("no arrow", rows_along=())))
+        self.words.on_update(view.step(self._typed))
+        view.modes[ROWS_MODE] = self._click
+
+    def _start(self) -> None:
+        self._begin = None
+        self.view.click.value = ROWS_MODE
+
+    def _click(self, origin: np.ndarray, ahead: np.ndarray) -> None:
+        session = self.view.session
+        assert session.cloud is not None
+        scanned = ScannedPoints.of(session.cloud, session.settings).places
+        found = nearest_point(self.view.frame.to_scene(scanned), origin, ahead, self.view.near)
+        if found is None:
+            raise InputError("no point of the scan is there; click on the scan")
+        if self._begin is None:
+            self._begin = scanned[found]
+            at = self.view.frame.to_scene(scanned[found][None])
+            self.view.scene.points("/rows", at, np.array(ROWS_COLOR, np.uint8), 0.12)
+            return
+        begin, self._begin = self._begin, None
+        self._set(begin, scanned[found])
+
+    def _set(self, begin: np.ndarray, end: np.ndarray) -> None:
+        arrow = tuple(float(f"{number:.9g}") for number in (*begin.tolist(), *(end - begin).tolist()))
+        self.view.session.set("arrow of rows", rows_along=arrow)
+
+    def _typed(self) -> None:
+        text = self.words.value.strip()
+        arrow = numbers_of(text, 6, "an arrow needs six numbers x, y, z, dx, dy, dz") if text else ()
+        self.view.session.set("arrow of rows", rows_along=arrow)
+
+    def _dragged(self, event: Any) -> None:
+        if event.phase == "end":
+            self.view.do(lambda: self._drop(np.array(event.target.position)))
+
+    def _drop(self, at: np.ndarray) -> None:
+        session = self.view.session
+        if session.cloud is not None and session.settings.rows_along:
+            end = ScannedPoints.of(session.cloud, session.settings).nearest(self.view.frame.from_scene(at))
+            self._set(np.array(session.settings.rows_along[:3]), end)
+
+    def fill(self, before: StudioState | None, state: StudioState) -> None:
+        """Show the arrow of a state."""
+        arrow = tuple(state.settings.rows_along)
+        if before is not None and tuple(before.settings.rows_along) == arrow and before.cloud is state.cloud:
+            return
+        self.words.value = ", ".join(f"{number:.7g}" for number in arrow)
+        if self._handle is not None:
+            self._handle.remove()
+            self._handle = None
+        self.view.scene.remove("/rows", "/rows arrow")
+        if not arrow or state.cloud is None:
+            return
+        ends = SceneFrame.of(state.cloud).to_scene(np.array([arrow[:3], np.add(arrow[:3], arrow[3:])]))
+        self.view.scene.arrows("/rows arrow", ends[1:], ends[1:] - ends[:1], ROWS_COLOR)
+        self._handle = self.view.scene.api.add_transform_controls(
+            "/rows head", scale=0.6, disable_rotations=True, depth_test=False, position=tuple(ends[1].tolist())
+        )
+        self._handle.on_update(self._dragged)

@@ -1,0 +1,100 @@
+"""What is taken of a scan that was opened: by class and place, without points that cleaning removes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..errors import InputError
+from ..scan.clean.steps import clean_points
+from ..scan.cloud import PointCloud
+from ..scan.formats.choose import choose, describe_points
+from ..selection import Selection
+from ..settings import Settings
+
+CLEANING_STEPS = ("duplicates", "near_duplicates", "outliers", "pieces")  #: those that only remove points
+
+
+@dataclass(frozen=True, eq=False)
+class Cleaning:
+    """What a cleaning does, with the numbers of the options of ``scantruss clean`` that repeat it."""
+
+    outlier_distance: float
+    loose_pieces: float
+    removes: np.ndarray  #: (N,) bool, of the points that were taken before
+    words: tuple[str, ...] = ()
+
+    @property
+    def options(self) -> list[str]:
+        """The options of ``scantruss clean``."""
+        numbers = ["--outlier-distance", f"{self.outlier_distance:g}", "--loose-pieces", f"{self.loose_pieces:g}"]
+        return [*numbers, "--keep-layers", "--no-smooth", "--no-normals"]
+
+
+@dataclass(frozen=True, eq=False)
+class WholeScan:
+    """A scan as it was opened."""
+
+    cloud: PointCloud
+    classes: np.ndarray | None = None  #: (N,) of its points, where the file has them
+
+    @property
+    def held_classes(self) -> tuple[int, ...]:
+        """The classes that occur."""
+        return () if self.classes is None else tuple(int(each) for each in np.unique(self.classes))
+
+
+def cleaning_of(cloud: PointCloud, outlier_distance: float, loose_pieces: float) -> Cleaning:
+    """Return what a cleaning would remove of a scan, as ``scantruss clean`` does it.
+
+    Raises
+    ------
+    InputError
+        A number is out of range, or too few points would be left.
+    """
+    found = clean_points(
+        cloud, outlier_distance=outlier_distance, loose_pieces=loose_pieces, layer_distance=None, smooth=False, normals=False
+    )  # fmt: skip
+    removes = np.ones(len(cloud.points), np.bool_)
+    removes[found.kept] = False
+    return Cleaning(
+        outlier_distance,
+        loose_pieces,
+        removes,
+        tuple(step.words for step in found.steps if step.name in CLEANING_STEPS and step.count),
+    )
+
+
+def part_of_scan(whole: WholeScan, settings: Settings, cleaning: Cleaning | None = None) -> PointCloud:
+    """Return the points that are taken, as if the file had been read with the classes and the crop of the settings.
+
+    Raises
+    ------
+    InputError
+        No point is left.
+    """
+    cloud = whole.cloud
+    if settings.classes or settings.crop:
+        places = cloud.points + cloud.origin
+        attributes = {} if whole.classes is None else {"class": whole.classes}
+        if settings.classes and not attributes:
+            raise InputError(f"{cloud.name or 'the scan'} has no classes to choose from")
+        kept, left_out = choose(places, attributes, Selection(classes=settings.classes, crop=settings.crop))
+        if not kept.any():
+            said = ", ".join(f"{count:,} {words}" for words, count in left_out.items() if count)
+            held = describe_points(places, attributes)
+            raise InputError(
+                f"no point of {cloud.name or 'the scan'} is left: of {len(places):,} points {said}; the scan has{held}"
+            )
+        cloud = _taken(cloud, kept)
+    return cloud if cleaning is None or not cleaning.removes.any() else _taken(cloud, ~cleaning.removes)
+
+
+def _taken(cloud: PointCloud, kept: np.ndarray) -> PointCloud:
+    """Return some points of a scan with an origin of their own, as of a file that holds no others."""
+    if kept.all():
+        return cloud
+    normals = None if cloud.normals is None else cloud.normals[kept]
+    part = PointCloud.from_array(cloud.points[kept] + cloud.origin, cloud.unit, cloud.name, normals)
+    return replace(part, system=cloud.system, notes=cloud.notes, dropped=cloud.dropped, left_out=cloud.left_out)

@@ -1,0 +1,201 @@
+"""Steps with the scan: open it, take a part of it, clean it."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError
+from ..runtime.files import temporary_folder
+from ..runtime.progress import Progress
+from ..scan.cloud import PointCloud
+from ..scan.member_length import length_range, suggest_length
+from ..settings import Settings
+from .opening import DATA_FOLDER, EXAMPLES, classes_of, next_free, read_whole
+from .project import read_project
+from .scan_parts import Cleaning, WholeScan, cleaning_of, part_of_scan
+from .solving import solved_state
+from .steps import Steps
+
+LARGEST_UPLOAD = 500_000_000  #: of a scan that comes through the page [bytes]
+NO_GRID: dict[str, Any] = {"grid": None, "asked": None, "is_live": False, "solution": None, "report": None}
+"""Changes of a scan that is another now."""
+
+
+class ScanSteps(Steps):
+    """Steps with the scan."""
+
+    def __init__(self, project: Path | None = None, *, folder: Path | None = None) -> None:
+        super().__init__(project, folder=folder)
+        self.proposal: Cleaning | None = None  #: a cleaning that is shown before it is done
+        self._proposal_of: PointCloud | None = None
+
+    @abstractmethod
+    def _make(self, effort: str, progress: Progress, *, live: bool = False) -> None:
+        """Make a grid."""
+
+    @abstractmethod
+    def _forget_features(self) -> None:
+        """Forget what was found on the scan before."""
+
+    @abstractmethod
+    def show_quick(self) -> bool:
+        """Make a quick grid of what was opened."""
+
+    def open(self, path: Path) -> None:
+        """Open a scan or a project.
+
+        Raises
+        ------
+        ScanTrussError
+            It cannot be read.
+        """
+        if path.suffix.lower() == ".scantruss":
+            state, solved = read_project(path)
+            self.begin(solved_state(state) if solved else state)
+            return
+        cloud = read_whole(path)
+        self._start(WholeScan(cloud, classes_of(path, cloud)))
+
+    def open_upload(self, name: str, content: bytes) -> None:
+        """Open a scan or a project that came through the page, as a step of the worker."""
+
+        def read(progress: Progress) -> None:
+            if len(content) > LARGEST_UPLOAD:
+                raise InputError(
+                    f"a scan of more than {LARGEST_UPLOAD:,} bytes; name it on the command line: scantruss studio SCAN"
+                )
+            own = Path(name.replace("\\", "/")).name
+            progress("read", 0.1)
+            with temporary_folder() as folder:
+                path = folder / (own or "scan")
+                path.write_bytes(content)
+                if path.suffix.lower() == ".scantruss":
+                    state, solved = read_project(path)
+                    taken = solved_state(state) if solved else state
+                    self.change(f"open {own}", **vars(taken))
+                    self._saved_beside(own)
+                    return
+                cloud = read_whole(path)
+                classes = classes_of(path, cloud)
+            self._start(WholeScan(replace(cloud, name=own), classes))
+            self._make("quick", progress, live=True)
+
+        self.worker.ask(read)
+
+    def open_example(self, name: str) -> None:
+        """Open a bundled scan and make its quick grid, as a step of the worker."""
+        file, settings = EXAMPLES[name]
+
+        def read(progress: Progress) -> None:
+            self._start(WholeScan(read_whole(DATA_FOLDER / file)), settings)
+            self._make("quick", progress, live=True)
+
+        self.worker.ask(read)
+
+    def _start(self, whole: WholeScan, settings: Settings | None = None) -> None:
+        cloud = whole.cloud
+        made = settings or Settings(length=suggest_length(cloud), unit=cloud.unit)
+        self.change(f"open {cloud.name}", whole=whole, cloud=cloud, cleaning=None, settings=made, **NO_GRID)
+        self._turn += 1
+        self._forget_features()
+        self._saved_beside(cloud.name or "scan")
+
+    def _saved_beside(self, name: str) -> None:
+        """Choose a project file, where there is none yet, and save."""
+        if self.place is None and self.folder is not None:
+            place = self.folder / f"{Path(name).stem}.scantruss"
+            self.place = next_free(place) if place.exists() else place
+        self.save()
+
+    def set_unit(self, unit: str) -> None:
+        """Take the unit of the scan's coordinates; the grid of the scan without it is gone."""
+        self.stop()
+        cloud, whole = self.cloud, self.state.whole
+        self._turn += 1
+        part = None if cloud is None else replace(cloud, unit=unit, system="")
+        if whole is not None:
+            same = part is not None and whole.cloud is cloud
+            whole = replace(whole, cloud=part if same and part else replace(whole.cloud, unit=unit, system=""))
+        self.change("unit", cloud=part, whole=whole, settings=self.settings.replace(unit=unit), **NO_GRID)
+        self.save()
+
+    def length_bounds(self) -> tuple[float, float]:
+        """Return the lengths that the slider offers: about the suggested one, within what the scan allows [scan unit]."""
+        if self.cloud is None:
+            return 0.5, 2.0
+        low, high = length_range(self.cloud)
+        wished = suggest_length(self.cloud)
+        return max(low, wished / 3), max(low, min(high, wished * 3))
+
+    # ---- a part of the scan
+
+    def crop(self, words: tuple[str, ...]) -> None:
+        """Take what lies in all of some parts of space, in the words of ``--crop``; none: all of it.
+
+        Raises
+        ------
+        InputError
+            A part of space cannot be read, or no point lies in it.
+        """
+        self._take("crop" if words else "no crop", self.settings.replace(crop=words))
+
+    def choose_classes(self, classes: tuple[int, ...]) -> None:
+        """Take the points of some classes; none: all of them."""
+        held = () if self.state.whole is None else self.state.whole.held_classes
+        if held and not set(classes) - set(held) and set(classes) != set(held):
+            self._take("classes", self.settings.replace(classes=classes))
+        else:
+            self._take("all classes", self.settings.replace(classes=()))
+
+    def propose_cleaning(self, outlier_distance: float, loose_pieces: float) -> None:
+        """Look for points that a cleaning would remove, which are shown before they go."""
+        cloud = self.cloud
+        if cloud is None:
+            raise InputError("there is no scan yet; open one")
+
+        def look(progress: Progress) -> None:
+            progress("clean", 0.1)
+            self.proposal, self._proposal_of = cleaning_of(cloud, outlier_distance, loose_pieces), cloud
+
+        self.worker.ask(look)
+
+    def proposed(self) -> Cleaning | None:
+        """Return the cleaning that is proposed of the present scan."""
+        return self.proposal if self._proposal_of is self.cloud and self.cloud is not None else None
+
+    def forget_cleaning(self) -> None:
+        """Propose no cleaning."""
+        self.proposal = self._proposal_of = None
+        self.tell()
+
+    def clean(self) -> None:
+        """Remove the points that are proposed.
+
+        Raises
+        ------
+        InputError
+            None are.
+        """
+        proposal = self.proposed()
+        if proposal is None or self.state.whole is None:
+            raise InputError("nothing is shown in red yet; press Show what goes")
+        if self.state.cleaning is not None:
+            raise InputError("the scan has been cleaned already; take that back with Undo to clean it otherwise")
+        self._take("clean", self.settings, proposal)
+
+    def _take(self, words: str, settings: Settings, cleaning: Cleaning | None = None) -> None:
+        """Take a part of the scan; a crop or a choice of classes comes before cleaning, and so forgets it."""
+        whole = self.state.whole
+        if whole is None:
+            raise InputError("there is no scan yet; open one")
+        part = part_of_scan(whole, settings, cleaning)
+        self.stop()
+        self._turn += 1
+        self._forget_features()
+        self.change(words, cloud=part, cleaning=cleaning, settings=settings, **NO_GRID)
+        self.save()
+        self.tell()
+        self.show_quick()

@@ -1,0 +1,108 @@
+"""Tab: open a scan, choose what is taken of it, clean it, measure it."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from ..settings import UNITS
+from .clean_tool import CleanTool
+from .colours import SCAN_COLOURINGS, legend_of
+from .crop_tool import CropTool
+from .opening import EXAMPLES
+from .tape import Tape
+
+if TYPE_CHECKING:
+    from .state import StudioState
+    from .view import StudioView
+
+UNKNOWN_UNIT = "not known"
+CLASS_NAMES = {
+    0: "never classified", 1: "unclassified", 2: "ground", 3: "low vegetation", 4: "medium vegetation", 5: "high vegetation",
+    6: "building", 7: "low noise", 9: "water", 10: "rail", 11: "road", 13: "wire guard", 14: "wire", 15: "tower", 17: "bridge deck",
+    18: "high noise",
+}  # fmt: skip  # ASPRS, LAS 1.4 R15 table 17
+MOST_CLASSES = 24  #: with a box of their own
+
+
+class ScanTab:
+    """The scan: where it comes from, how it is drawn, and what is taken of it."""
+
+    def __init__(self, view: StudioView, gui: Any) -> None:
+        self.view, session, step = view, view.session, view.step
+        upload = gui.add_upload_button(
+            "Open a scan or project", hint="at most 500 MB; a larger one: scantruss studio SCAN"
+        )
+        self.example = gui.add_dropdown("example", tuple(EXAMPLES))
+        opened = gui.add_button("Open the example")
+        self.about = gui.add_markdown("")
+        self.unit = gui.add_dropdown("unit", tuple(name or UNKNOWN_UNIT for name in UNITS), initial_value=UNKNOWN_UNIT)
+        self.draws = gui.add_checkbox("draw scan", True)
+        self.coloring = gui.add_dropdown("colour", SCAN_COLOURINGS)
+        self.legend = gui.add_html("")
+        with gui.add_folder("Crop", expand_by_default=False):
+            self.crop = CropTool(view, gui)
+        self._classes = gui.add_folder("Classes", expand_by_default=False, visible=False)
+        with gui.add_folder("Clean", expand_by_default=False):
+            self.clean = CleanTool(view, gui)
+        with gui.add_folder("Tape", expand_by_default=False):
+            self.tape = Tape(view, gui)
+        self._gui, self._boxes = gui, dict[int, Any]()
+        upload.on_upload(lambda event: session.open_upload(upload.value.name, upload.value.content))
+        opened.on_click(step(lambda: session.open_example(self.example.value)))
+        self.unit.on_update(step(lambda: session.set_unit("" if self.unit.value == UNKNOWN_UNIT else self.unit.value)))
+        for each in (self.draws, self.coloring):
+            each.on_update(step(self.draw))
+
+    def fill(self, before: StudioState | None, state: StudioState) -> None:
+        """Show a state."""
+        cloud = state.cloud
+        unit = f" {cloud.unit}" if cloud is not None and cloud.unit else ""
+        if cloud is None:
+            self.about.content = "Open a scan: any format that `scantruss info` reads."
+        elif before is None or before.cloud is not cloud:
+            place = self.view.session.place
+            saved = f"; saved as {place.name} after each step" if place is not None else "; not saved"
+            whole = len(cloud.points) if state.whole is None else len(state.whole.cloud.points)
+            of_all = f" of {whole:,}" if whole != len(cloud.points) else ""
+            self.about.content = f"**{cloud.name or 'scan'}**: {len(cloud.points):,}{of_all} points, {cloud.extent:.4g}{unit} long{saved}"
+            self.unit.value = cloud.unit or UNKNOWN_UNIT
+        if before is None or before.whole is not state.whole or before.settings.classes != state.settings.classes:
+            self._fill_classes(state)
+        for tool in (self.crop, self.clean, self.tape):
+            tool.fill(before, state)
+        if before is None or before.cloud is not cloud or before.grid is not state.grid:
+            if state.grid is not None and (before is None or before.grid is None):
+                self.draws.value = False  # it hides the grid
+            elif state.grid is None:
+                self.draws.value = True
+            self.draw()
+
+    def _fill_classes(self, state: StudioState) -> None:
+        held = () if state.whole is None else state.whole.held_classes
+        if tuple(self._boxes) != held:
+            for box in self._boxes.values():
+                box.remove()
+            self._classes.visible = len(held) > 1
+            with self._classes:
+                self._boxes = {number: self._box(number) for number in held[:MOST_CLASSES]}
+        for number, box in self._boxes.items():
+            box.value = not state.settings.classes or number in state.settings.classes
+
+    def _box(self, number: int) -> Any:
+        box = self._gui.add_checkbox(f"{number} {CLASS_NAMES.get(number, '')}".strip(), True)
+        box.on_update(self.view.step(partial(self._choose_classes)))
+        return box
+
+    def _choose_classes(self) -> None:
+        self.view.session.choose_classes(tuple(number for number, box in self._boxes.items() if box.value))
+
+    def draw(self) -> None:
+        """Draw the scan."""
+        state = self.view.session.state
+        if state.cloud is None or not self.draws.value:
+            self.view.scene.remove_scan()
+            self.legend.content = ""
+            return
+        scale = self.view.scene.scan(state, self.coloring.value, self.view.look.section)
+        self.legend.content = "" if scale is None else legend_of(scale[0], state.cloud.unit, *scale[1:], False)

@@ -1,0 +1,107 @@
+"""What the studio takes of a scan: the same points as the command line does."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import scantruss as st
+from scantruss.cli.main import main
+from scantruss.scan.formats.reading import read_points
+from scantruss.selection import Selection
+from scantruss.studio.outputs import command_of
+from scantruss.studio.session import Session
+
+PATIENCE = 120.0
+
+
+def waves() -> np.ndarray:
+    """Return the points of a wavy roof of 20 by 12 at national coordinates, and a few far above it."""
+    x, y = (each.ravel() for each in np.meshgrid(np.linspace(0, 20, 81), np.linspace(0, 12, 49)))
+    roof = np.stack([x, y, np.sin(x / 4) + 0.03 * y + 0.01 * x], axis=1)
+    above = np.stack([np.linspace(3, 17, 8), np.full(8, 6.0), np.full(8, 9.0)], axis=1)
+    return np.concatenate([roof, above]) + [4.5e5, 5.3e6, 100.0]
+
+
+@pytest.fixture(scope="module")
+def las(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Save the roof with two classes: east and west."""
+    laspy = pytest.importorskip("laspy")
+    place = tmp_path_factory.mktemp("scan") / "roof.las"
+    points = waves()
+    header = laspy.LasHeader(point_format=0, version="1.2")
+    header.scales, header.offsets = np.full(3, 0.001), np.floor(points.min(axis=0))
+    file = laspy.LasData(header)
+    file.x, file.y, file.z = points.T
+    file.classification = np.where(points[:, 0] < 4.5e5 + 10.2, 2, 6).astype(np.uint8)
+    file.write(place)
+    return place
+
+
+def opened(place: Path, project: Path) -> Session:
+    """Open a scan, without a quick grid after each step: it is not looked at."""
+    session = Session(project)
+    session.open(place)
+    session.show_quick = lambda: False  # type: ignore[method-assign]
+    return session
+
+
+def test_a_crop_and_classes_take_what_reading_takes(las: Path, tmp_path: Path) -> None:
+    session = opened(las, tmp_path / "roof.scantruss")
+    whole = session.cloud
+    assert whole is not None and session.state.whole is not None and session.state.whole.held_classes == (2, 6)
+    crop = ("polygon:450003,5300001,450018,5300001,450018,5300011,450003,5300008",)
+    for classes, crops in (((6,), ()), ((), crop), ((2,), crop)):
+        session.choose_classes(classes)
+        session.crop(crops)
+        read = read_points(las, selection=Selection(classes=classes, crop=crops))
+        assert session.cloud is not None
+        assert np.array_equal(session.cloud.points, read.points) and np.array_equal(session.cloud.origin, read.origin)
+        again = Session()
+        again.open(tmp_path / "roof.scantruss")
+        assert again.cloud is not None and np.array_equal(again.cloud.points, read.points)
+        assert again.state.whole is not None and len(again.state.whole.cloud.points) == len(whole.points)
+    with pytest.raises(st.InputError, match=r"no point of .*roof\.las is left"):
+        session.crop(("box:0,0,1,1",))
+    session.crop(())
+    session.choose_classes((2, 6))
+    assert session.cloud is whole and not session.settings.classes and not session.settings.crop
+    session.undo()
+    assert session.settings.classes == (2,)
+
+
+def test_what_is_red_goes_and_the_command_line_does_the_same(
+    las: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    session = opened(las, tmp_path / "roof.scantruss")
+    with pytest.raises(st.InputError, match="Show what goes"):
+        session.clean()
+    session.crop(("box:450000,5300000,450019,5300012",))
+    before = session.cloud
+    assert before is not None
+    session.propose_cleaning(3.0, 0.005)
+    assert session.worker.wait(PATIENCE) and session.message == ""
+    found = session.proposed()
+    assert found is not None and session.cloud is before
+    high = before.points[:, 2] + before.origin[2] > 105
+    assert found.removes[high].all() and found.removes.sum() == high.sum() == 8
+    session.clean()
+    cleaned = session.cloud
+    assert cleaned is not None and len(cleaned.points) == len(before.points) - 8 and session.proposed() is None
+    again = Session()
+    again.open(tmp_path / "roof.scantruss")
+    assert again.cloud is not None and np.array_equal(again.cloud.points, cleaned.points)
+    clean, grid, _ = command_of(session.state).splitlines()
+    assert clean.startswith("scantruss clean roof.las clean.ply --crop box:450000") and "grid clean.ply" in grid
+    monkeypatch.chdir(tmp_path)
+    Path("roof.las").write_bytes(las.read_bytes())
+    assert main(clean.split()[1:]) == 0
+    read = read_points("clean.ply")
+    assert np.allclose(read.points + read.origin, cleaned.points + cleaned.origin, atol=1e-9)
+    with pytest.raises(st.InputError, match="cleaned already"):
+        session.propose_cleaning(3.0, 0.005)
+        assert session.worker.wait(PATIENCE)
+        session.clean()
+    session.crop(())  # begins anew
+    assert session.state.cleaning is None and session.state.whole is not None
+    assert session.cloud is session.state.whole.cloud

@@ -1,0 +1,57 @@
+"""The structure of the studio is that of the command line: sections, modes, masses."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import scantruss as st
+from scantruss.cli.main import main
+from scantruss.studio.outputs import settings_files
+from scantruss.studio.session import Session
+from scantruss.studio.tab_structure import scale_of_text, weight_bars
+
+PATIENCE = 120.0
+
+
+def test_sizing_and_modes_are_those_of_the_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    x, y = (each.ravel() for each in np.meshgrid(np.linspace(0, 10, 50), np.linspace(0, 10, 50)))
+    np.savetxt(tmp_path / "dome.xyz", np.stack([x, y, 2 - 0.04 * ((x - 5) ** 2 + (y - 5) ** 2)], axis=1))
+    session = Session(tmp_path / "dome.scantruss")
+    session.open(tmp_path / "dome.xyz")
+    session.set_unit("m")
+    session.change("length", settings=session.settings.replace(length=2.5, effort="quick"))
+    session.generate()
+    assert session.worker.wait(PATIENCE) and session.message == ""
+    session.set_structure(loads="self,snow:1kN/m2", size=2, buckling=2, frequencies=1, scale=2.0)
+    session.run_structure()
+    assert session.worker.wait(PATIENCE) and session.message == ""
+    report = session.state.report
+    assert report is not None and report.weights is not None and sorted(report.weights) == [1, 2]
+    assert report.weights[2] == report.truss.mass <= report.weights[1]
+    assert report.buckling is not None and len(report.buckling.values) == 2
+    monkeypatch.chdir(tmp_path)
+    for name, content in (settings_files(session.state) | session.files("grid", ".json")).items():
+        Path(name).write_bytes(content)
+    assert main("structure grid.json s.json --settings structure.toml --report r.json".split()) == 0
+    ours, theirs = report.to_dict(), json.loads(Path("r.json").read_text())
+    for name in ("sections", "weights", "utilization_max", "buckling", "frequencies"):
+        assert json.loads(json.dumps(ours.get(name))) == theirs.get(name), name
+    again = Session()
+    again.open(tmp_path / "dome.scantruss")
+    assert again.state.structure_settings == session.state.structure_settings
+    assert again.state.report is not None and again.state.report.weights == report.weights
+
+
+def test_scales_and_weights_are_words_of_the_page() -> None:
+    assert scale_of_text("1:100") == 0.01 and scale_of_text("2") == 2.0
+    for text in ("", "1:0", "x"):
+        with pytest.raises(ValueError):
+            scale_of_text(text)
+    assert "12,300 kg" in weight_bars({1: 12300.0, 2: 9000.0})
+
+
+def test_a_number_of_sections_that_is_none_is_refused() -> None:
+    with pytest.raises(st.InputError, match="size is a number of different sections"):
+        Session().set_structure(size=-1)
