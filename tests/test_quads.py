@@ -50,7 +50,6 @@ def quads(hole: bool = False) -> Grid:
     return st.grid_from_points(bowl(hole), st.Settings(length=LENGTH, cells="quad", unit="m"))
 
 
-@pytest.mark.kernels
 @compiled_only
 @pytest.mark.parametrize("hole", [False, True])
 def test_all_panels_are_quads_of_an_oriented_manifold_with_the_loops_of_the_scan(hole: bool) -> None:
@@ -66,7 +65,6 @@ def test_all_panels_are_quads_of_an_oriented_manifold_with_the_loops_of_the_scan
     assert grid.certificate is not None and grid.certificate.passed
 
 
-@pytest.mark.kernels
 @compiled_only
 @pytest.mark.parametrize("hole", [False, True])
 def test_members_are_even_corners_nearly_right_and_nodes_have_four_members(hole: bool) -> None:
