@@ -7,7 +7,10 @@ from __future__ import annotations
 
 import csv
 import json
+import os
 import re
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -228,3 +231,28 @@ def test_nodes_marks_and_names_are_the_same_in_every_format(kind: str, suffix: s
         assert list(found.marks) == [f"N{k:03d}" for k in range(1, len(grid.nodes) + 1)]
     if suffix not in WITHOUT_NAMES:
         assert all(word in found.names for word in WORDS)
+
+
+def write_all(folder: str) -> None:
+    """Write a grid and a structure in every format, for a process of its own."""
+    grid = grid_in("m")
+    solved = st.solve(st.Truss.from_grid(grid, supports="boundary", loads="self,snow:1kN/m2"))
+    for kind, suffix in CASES:
+        write(grid if kind == "grid" else solved, Path(folder, f"{kind}{suffix}"))
+
+
+def test_processes_with_other_seeds_of_words_write_the_same_bytes(tmp_path: Path) -> None:
+    command = [sys.executable, "-c", "import sys, test_every_format as t; t.write_all(sys.argv[1])"]
+    path = os.pathsep.join([str(Path(__file__).parent), *filter(None, sys.path)])
+    running = []
+    for seed in ("1", "2"):
+        (tmp_path / seed).mkdir()
+        environment = os.environ | {"PYTHONHASHSEED": seed, "PYTHONPATH": path}
+        running.append(subprocess.Popen([*command, str(tmp_path / seed)], env=environment))
+    assert [each.wait(timeout=300) for each in running] == [0, 0]
+    names = [sorted(each.name for each in (tmp_path / seed).iterdir()) for seed in ("1", "2")]
+    assert names[0] == names[1] and len(names[0]) > len(CASES)
+    different = [
+        name for name in names[0] if (tmp_path / "1" / name).read_bytes() != (tmp_path / "2" / name).read_bytes()
+    ]
+    assert different == []

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -83,14 +83,14 @@ def _sections(truss: Truss) -> Iterator[str]:
             if len(own):
                 yield from (f'*SOLID SECTION, ELSET="section {_plain(each.name)}", MATERIAL=material', repr(each.area))
         return
-    for number, section in enumerate(truss.section_of.tolist(), 1):
-        own = truss.sections[section]
-        yield f"*ELSET, ELSET=member{number}"
-        yield str(number)
-        yield f"*BEAM GENERAL SECTION, SECTION=GENERAL, ELSET=member{number}, DENSITY={material.density!r}"
-        yield f"{own.area!r}, {own.inertia_y!r}, 0.0, {own.inertia_z!r}, {own.torsion!r}"
-        yield ", ".join(map(repr, y[number - 1]))  # axis 1; axis 2 is z then
-        yield f"{material.young!r}, {material.shear!r}"
+    forms = [
+        f"*ELSET, ELSET=member%d\n%d\n*BEAM GENERAL SECTION, SECTION=GENERAL, ELSET=member%d, DENSITY={material.density!r}\n"
+        f"{own.area!r}, {own.inertia_y!r}, 0.0, {own.inertia_z!r}, {own.torsion!r}\n"
+        f"%r, %r, %r\n{material.young!r}, {material.shear!r}"  # axis 1; axis 2 is z then
+        for own in truss.sections
+    ]
+    for number, (section, axis) in enumerate(zip(truss.section_of.tolist(), y, strict=True), 1):
+        yield forms[section] % (number, number, number, *axis)
     loose = np.argwhere(truss.end_stiffness == 0).tolist()
     if loose:
         yield "*RELEASE"
@@ -107,11 +107,16 @@ def _step(truss: Truss, case: LoadCase) -> Iterator[str]:
     nodal = nodal_loads(truss, case)
     if nodal.any():
         yield "*CLOAD"
-        yield from (f"{node + 1}, {way + 1}, {float(nodal[node, way])!r}" for node, way in np.argwhere(nodal).tolist())
+        yield from _loaded(nodal, range(1, 7))
     line = np.zeros((0, 3)) if truss.pinned else line_loads(truss, case)
     if line.any():
         yield "*DLOAD"
-        yield from (
-            f"{member + 1}, P{'XYZ'[way]}, {float(line[member, way])!r}" for member, way in np.argwhere(line).tolist()
-        )
+        yield from _loaded(line, ("PX", "PY", "PZ"))
     yield from ("*NODE PRINT", "U", "*END STEP")
+
+
+def _loaded(values: np.ndarray, ways: Sequence[str | int]) -> Iterator[str]:
+    """Yield a line for each value that is not 0: node or member from 1, way, value."""
+    rows, columns = np.nonzero(values)
+    named = [ways[k] for k in columns.tolist()]
+    return map("%d, %s, %r".__mod__, zip((rows + 1).tolist(), named, values[rows, columns].tolist(), strict=True))

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import io
 import re
-from typing import TYPE_CHECKING
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -51,6 +52,10 @@ def encode_dxf(model: Model, style: FileStyle) -> bytes:
         entities = _Entities(first, drawing.modelspace().layout_key)
         _draw(model, entities, radius, mean)
         drawing.entitydb.handles.reset(f"{entities.next:X}")
+        for kind in sorted(
+            drawing.entitydb.dxf_types_in_use()
+        ):  # ezdxf takes them from a set, in another order each time
+            drawing.classes.add_class(kind)
         text = io.StringIO()
         drawing.write(text)
     finally:
@@ -66,56 +71,75 @@ class _Entities:
         self.next, self.owner = first, owner
         self.lines: list[str] = []
 
-    def add(self, kind: str, layer: str, body: str, owner: str = "") -> str:
-        """Add an entity and return its handle."""
-        handle = f"{self.next:X}"
-        self.next += 1
-        head = f"  0\n{kind}\n  5\n{handle}\n330\n{owner or self.owner}\n100\nAcDbEntity\n  8\n{layer}\n"
-        self.lines.append(head + body)
-        return handle
+    def add(self, form: str, rows: Iterable[tuple[Any, ...]], count: int) -> None:
+        """Add `count` rows of entities, each by a form of `_entity` whose %X are handles in a row."""
+        self.lines += [form % row for row in rows]
+        self.next += count
 
     def insert(
-        self, block: str, layer: str, place: list[float], size: float, words: dict[str, tuple[str, str]]
+        self, block: str, layer: str, places: np.ndarray, size: float, words: dict[str, tuple[list[str], str]]
     ) -> None:
-        """Add a copy of a block with attributes, each a text and its layer; none of them hidden."""
-        x, y, z = place
+        """Add copies of a block at (K, 3) places with attributes, each K texts and their layer; none of them hidden."""
+        count = len(words) + 2
         scale = f" 41\n{size}\n 42\n{size}\n 43\n{size}\n"
-        at = f" 10\n{x}\n 20\n{y}\n 30\n{z}\n"
-        handle = self.add("INSERT", layer, f"100\nAcDbBlockReference\n 66\n1\n  2\n{block}\n{at}{scale}")
-        for number, (tag, (word, where)) in enumerate(words.items()):  # each below the one before
-            text = f"100\nAcDbText\n 10\n{x + size}\n 20\n{y + size * (1 - 1.5 * number)}\n 30\n{z}\n 40\n{size}\n  1\n{word}\n"
-            self.add("ATTRIB", where, f"{text}100\nAcDbAttribute\n  2\n{tag}\n 70\n0\n", handle)
-        self.add("SEQEND", layer, "", handle)
+        form = _entity("INSERT", layer, self.owner, f"100\nAcDbBlockReference\n 66\n1\n  2\n{block}\n{AT}{scale}")
+        columns = [_handles(self.next, count, len(places)), *places.T.tolist()]
+        for number, (tag, (texts, where)) in enumerate(words.items()):  # each below the one before
+            body = f"100\nAcDbText\n{AT} 40\n{size}\n  1\n%s\n100\nAcDbAttribute\n  2\n{tag}\n 70\n0\n"
+            form += _entity("ATTRIB", where, "%X", body)
+            moved = places + [size, size * (1 - 1.5 * number), 0.0]
+            columns += [_handles(self.next + 1 + number, count, len(places)), columns[0], *moved.T.tolist(), texts]
+        form += _entity("SEQEND", layer, "%X", "")
+        columns += [_handles(self.next + count - 1, count, len(places)), columns[0]]
+        self.add(form, zip(*columns, strict=True), count * len(places))
+
+
+AT = " 10\n%r\n 20\n%r\n 30\n%r\n"  #: form of a place
+
+
+def _entity(kind: str, layer: str, owner: str, body: str) -> str:
+    """Return the form of an entity: its handle, then what the layer, the owner and the body hold."""
+    return f"  0\n{kind}\n  5\n%X\n330\n{owner}\n100\nAcDbEntity\n  8\n{layer}\n{body}"
+
+
+def _handles(first: int, step: int, count: int) -> range:
+    return range(first, first + step * count, step)
 
 
 def _draw(model: Model, to: _Entities, radius: float, mean: float) -> None:
     nodes = model.nodes
-    corners = [[f" 1{k}\n{x}\n 2{k}\n{y}\n 3{k}\n{z}\n" for x, y, z in nodes.tolist()] for k in range(4)]
-    middles = nodes[model.members].mean(axis=1).tolist()
-    height = f" 40\n{TEXT * mean}\n"
-    table = zip(
-        map(_one_line, model.member_marks), layers_of_members(model), model.members.tolist(), middles, strict=True
+    texts = [tuple(map(repr, place)) for place in nodes.tolist()]
+    corners = [[f" 1{k}\n{x}\n 2{k}\n{y}\n 3{k}\n{z}\n" for x, y, z in texts] for k in range(4)]
+    start, end = model.members.T.tolist()
+    marks, count = [_one_line(mark) for mark in model.member_marks], len(model.members)
+    marked = f"1001\n{APPLICATION}\n1000\n%s\n"
+    line = _entity("LINE", "%s", to.owner, f"100\nAcDbLine\n%s%s{marked}")
+    text = _entity(
+        "TEXT", "marks members", to.owner, f"100\nAcDbText\n{AT} 40\n{TEXT * mean}\n  1\n%s\n100\nAcDbText\n"
     )
-    for mark, layer, (start, end), (x, y, z) in table:
-        marked = f"1001\n{APPLICATION}\n1000\n{mark}\n"
-        to.add("LINE", layer, f"100\nAcDbLine\n{corners[0][start]}{corners[1][end]}{marked}")
-        place = f" 10\n{x}\n 20\n{y}\n 30\n{z}\n"
-        to.add("TEXT", "marks members", f"100\nAcDbText\n{place}{height}  1\n{mark}\n100\nAcDbText\n")
-    faces = zip(map(_one_line, model.panel_marks), model.panel_loops, strict=True)
-    for mark, loop in faces:
-        marked = f"1001\n{APPLICATION}\n1000\n{mark}\n"
+    columns = (
+        _handles(to.next, 2, count), layers_of_members(model), [corners[0][k] for k in start], [corners[1][k] for k in end],
+        marks, _handles(to.next + 1, 2, count), *nodes[model.members].mean(axis=1).T.tolist(), marks,
+    )  # fmt: skip
+    to.add(line + text, zip(*columns, strict=True), 2 * count)
+    faces: list[tuple[Any, ...]] = []
+    for mark, loop in zip(map(_one_line, model.panel_marks), model.panel_loops, strict=True):
         for begin in range(
             1, len(loop) - 2 + len(loop) % 2, 2
         ):  # a face has four corners at most: more are a fan of faces
             a, b, c, d = loop[0], loop[begin], loop[begin + 1], loop[min(begin + 2, len(loop) - 1)]
             hidden = 1 * (begin > 1) + 8 * (begin + 2 < len(loop) - 1)
-            places = corners[0][a] + corners[1][b] + corners[2][c] + corners[3][d] + f" 70\n{hidden}\n" * bool(hidden)
-            to.add("3DFACE", "panels", f"100\nAcDbFace\n{places}{marked}")
-    for mark, place in zip(map(_one_line, model.node_marks), nodes.tolist(), strict=True):
-        to.insert("NODE", "nodes", place, radius, {"MARK": (mark, "marks nodes")})
-    for node in model.supported.tolist():
-        words = {"MARK": (_one_line(model.node_marks[node]), "supports"), "HELD": (held_words(model, node), "supports")}
-        to.insert("SUPPORT", "supports", nodes[node].tolist(), 2 * radius, words)
+            places = corners[0][a] + corners[1][b] + corners[2][c] + corners[3][d]
+            faces.append((to.next + len(faces), places, f" 70\n{hidden}\n" * bool(hidden), mark))
+    to.add(_entity("3DFACE", "panels", to.owner, f"100\nAcDbFace\n%s%s{marked}"), faces, len(faces))
+    marks = [_one_line(mark) for mark in model.node_marks]
+    to.insert("NODE", "nodes", nodes, radius, {"MARK": (marks, "marks nodes")})
+    held = model.supported.tolist()
+    words = {
+        "MARK": ([marks[node] for node in held], "supports"),
+        "HELD": ([held_words(model, node) for node in held], "supports"),
+    }
+    to.insert("SUPPORT", "supports", nodes[model.supported], 2 * radius, words)
 
 
 def _one_line(word: str) -> str:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import FormatError, InputError
 from ..grid.grid import Grid
 from ..runtime.files import check_place, nearest_suffix, suffix_of, write_files
+from ..runtime.memory import nothing_collected
 from ..scan.cloud import PointCloud
 from ..scan.formats.extras import need_library
 from ..settings import UNITS
@@ -254,7 +255,8 @@ def write(
     check_unit(path, model.unit)
     encode = FORMATS[suffix_of(path, suffixes_of())].encode
     assert encode is not None  # `check_output` knows only formats that are written
-    return write_files(encode(model, path, style or FileStyle()))
+    with nothing_collected():
+        return write_files(encode(model, path, style or FileStyle()))
 
 
 def read_model(path: str | Path, merge: float | None = None) -> Model:

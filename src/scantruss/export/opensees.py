@@ -6,7 +6,8 @@ zeroLength elements between a node and a second node at its place. Both scripts 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from .style import FileStyle
 if TYPE_CHECKING:
     from ..structure.truss import LoadCase, Truss
 
-Command = tuple[str | int | float, ...]
+Command = tuple[Any, ...]  # a name and its values; of many alike each value is a column: a list, or one for all
 RIGID = 1e5  #: stiffness of a rigid part of a spring joint, times the bending or torsional stiffness of the member
 
 TCL_RUN = """
@@ -78,7 +79,7 @@ def encode_tcl(model: Model, style: FileStyle) -> bytes:
     """Return the script for OpenSees itself."""
     truss = _truss(model)
     lines = [*(f"# {words}" for words in _head(truss)), "", "proc build_model {} {"]
-    lines += [*(f"    {_tcl(command)}" for command in _model(model, truss)), "}"]
+    lines += [*_tcl(_model(model, truss), "    "), "}"]
     for number, case in enumerate(truss.cases, 1):
         lines += [
             "",
@@ -86,7 +87,7 @@ def encode_tcl(model: Model, style: FileStyle) -> bytes:
             "    timeSeries Linear 1",
             "    pattern Plain 1 1 {",
         ]
-        lines += [f"        {_tcl(command)}" for command in _loads(truss, case)] + ["    }", "}"]
+        lines += [*_tcl(_loads(truss, case), "        "), "    }", "}"]
     return "\n".join([*lines, TCL_RUN % _words(truss)]).encode("utf-8")
 
 
@@ -95,10 +96,10 @@ def encode_py(model: Model, style: FileStyle) -> bytes:
     truss = _truss(model)
     lines = [*(f"# {words}" for words in _head(truss)), "", "try:", "    import openseespy.opensees as ops"]
     lines += ["except ImportError:", "    import opensees.openseespy as ops"]
-    lines += ["", "", "def build_model():", *(f"    {_python(command)}" for command in _model(model, truss))]
+    lines += ["", "", "def build_model():", *_python(_model(model, truss))]
     for number, case in enumerate(truss.cases, 1):
         lines += ["", "", f"def case{number}():  # {_plain(case.name)}", '    ops.timeSeries("Linear", 1)']
-        lines += ['    ops.pattern("Plain", 1, 1)', *(f"    {_python(command)}" for command in _loads(truss, case))]
+        lines += ['    ops.pattern("Plain", 1, 1)', *_python(_loads(truss, case))]
     return "\n".join([*lines, PYTHON_RUN % _words(truss)]).encode("utf-8")
 
 
@@ -143,13 +144,25 @@ def _words(truss: Truss) -> dict[str, str | int]:
     }
 
 
-def _tcl(command: Command) -> str:
-    return " ".join(map(str, command))
+def _written(commands: list[Command], head: str, between: str, tail: str, indent: str) -> Iterator[str]:
+    """Yield the lines of commands, whose name stands in the head."""
+    word = str if between == " " else repr
+    for name, *values in commands:
+        before = indent + head % name
+        if not any(type(value) is list for value in values):
+            yield before + between.join(map(word, values)) + tail
+            continue
+        form = between.join("%s" if type(value) is list else word(value).replace("%", "%%") for value in values)
+        lists = [map(word, value) for value in values if type(value) is list]
+        yield from map((before + form + tail).__mod__, zip(*lists, strict=True))
 
 
-def _python(command: Command) -> str:
-    name, *rest = command
-    return f"ops.{name}({', '.join(map(repr, rest))})"
+def _tcl(commands: list[Command], indent: str) -> Iterator[str]:
+    return _written(commands, "%s ", " ", "", indent)
+
+
+def _python(commands: list[Command]) -> Iterator[str]:
+    return _written(commands, "ops.%s(", ", ", ")", "    ")
 
 
 def _settling(truss: Truss) -> np.ndarray:
@@ -165,7 +178,7 @@ def _model(model: Model, truss: Truss) -> list[Command]:
     """Return the commands that make nodes, supports and members."""
     count = 3 if truss.pinned else 6
     made: list[Command] = [("model", "basic", "-ndm", 3, "-ndf", count)]
-    made += [("node", number, x, y, z) for number, (x, y, z) in enumerate(model.nodes.tolist(), 1)]
+    made.append(("node", list(range(1, len(truss.nodes) + 1)), *model.nodes.T.tolist()))
     supports = truss.supports[:, :count]
     fixed = np.isinf(supports)
     fixed[:, :3] &= ~_settling(truss)
@@ -209,47 +222,47 @@ class _Extra:
 def _members(model: Model, truss: Truss, made: list[Command], extra: _Extra) -> None:
     """Add the members, with springs at their ends."""
     material, axes = truss.material, truss.axes
-    table = list(zip(truss.members.tolist(), truss.section_of.tolist(), strict=True))
     made.append(("uniaxialMaterial", "Elastic", 1, material.young))
+    numbers, sections = list(range(1, len(truss.members) + 1)), truss.section_of.tolist()
     if truss.pinned:
-        for number, ((start, end), section) in enumerate(table, 1):
-            made.append(("element", "Truss", number, start + 1, end + 1, truss.sections[section].area, 1))
+        areas = [truss.sections[k].area for k in sections]
+        made.append(("element", "Truss", numbers, *(truss.members.T + 1).tolist(), areas, 1))
         return
-    stiffness: list[Command] = [
-        tuple(
+    stiffness = [
+        [
             Written(repr(value))
             for value in (each.area, material.young, material.shear, each.torsion, each.inertia_y, each.inertia_z)
-        )
+        ]
         for each in truss.sections
     ]
-    springy = np.isfinite(truss.end_stiffness).any(axis=2).tolist()
-    frames, lengths = axes.tolist(), truss.lengths.tolist()
-    for number, ((start, end), section) in enumerate(table, 1):
-        own, ends, frame = truss.sections[section], [start + 1, end + 1], frames[number - 1]
-        rigid = RIGID * material.young * max(own.inertia_y, own.inertia_z, own.torsion) / lengths[number - 1]
-        for which in [end for end in (0, 1) if springy[number - 1][end]]:
+    made.append(("geomTransf", "Linear", numbers, *axes[:, 2].T.tolist()))
+    springy = np.isfinite(truss.end_stiffness).any(axis=2)
+    both, lengths = (truss.members + 1).tolist(), truss.lengths
+    for member in np.flatnonzero(springy.any(axis=1)).tolist():
+        own, ends, frame = truss.sections[sections[member]], both[member], axes[member].tolist()
+        rigid = RIGID * material.young * max(own.inertia_y, own.inertia_z, own.torsion) / float(lengths[member])
+        for which in np.flatnonzero(springy[member]).tolist():
             joint = ends[which]
             ends[which] = extra.node(model.nodes[joint - 1].tolist())
             made.append(("equalDOF", joint, ends[which], 1, 2, 3))
-            about_y, about_z = truss.end_stiffness[number - 1, which].tolist()
+            about_y, about_z = truss.end_stiffness[member, which].tolist()
             held = [(4, rigid), (5, min(about_y, rigid)), (6, min(about_z, rigid))]
             extra.springs(joint, ends[which], [(way, value) for way, value in held if value], frame)
-        made.append(("geomTransf", "Linear", number, *frame[2]))
-        made.append(("element", "elasticBeamColumn", number, *ends, *stiffness[section], number))
+    shared = [[stiffness[k][column] for k in sections] for column in range(6)]
+    start, end = [ends[0] for ends in both], [ends[1] for ends in both]
+    made.append(("element", "elasticBeamColumn", numbers, start, end, *shared, numbers))
 
 
 def _loads(truss: Truss, case: LoadCase) -> list[Command]:
     """Return the loads of a case: forces on nodes, lines along members in local axes, imposed displacements."""
     nodal = nodal_loads(truss, case)
-    made: list[Command] = [
-        ("load", node + 1, *nodal[node].tolist()) for node in np.flatnonzero(nodal.any(axis=1)).tolist()
-    ]
+    loaded = np.flatnonzero(nodal.any(axis=1))
+    made: list[Command] = [("load", (loaded + 1).tolist(), *nodal[loaded].T.tolist())]
     if not truss.pinned:
         line = line_loads(truss, case)
-        local = np.einsum("mij,mj->mi", truss.axes, line)
-        for member in np.flatnonzero(line.any(axis=1)).tolist():
-            x, y, z = local[member].tolist()
-            made.append(("eleLoad", "-ele", member + 1, "-type", "-beamUniform", y, z, x))
+        loaded = np.flatnonzero(line.any(axis=1))
+        x, y, z = np.einsum("mij,mj->mi", truss.axes[loaded], line[loaded]).T.tolist()
+        made.append(("eleLoad", "-ele", (loaded + 1).tolist(), "-type", "-beamUniform", y, z, x))
     for node, way in np.argwhere(_settling(truss)).tolist():
         value = 0.0 if case.settlement is None else float(np.nan_to_num(case.settlement[node, way]))
         made.append(("sp", node + 1, way + 1, value))

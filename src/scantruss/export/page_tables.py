@@ -42,7 +42,11 @@ Tables = dict[str, list[PageColumn]]
 def column(name: str, unit: str, values: Iterable[Any] | np.ndarray) -> PageColumn:
     """Return a column of plain values; NaN becomes None, and numbers keep six digits."""
     plain = values.tolist() if isinstance(values, np.ndarray) else list(values)
-    return PageColumn(name, unit, [_short(value) if isinstance(value, float) else value for value in plain])
+    if not any(isinstance(value, float) for value in plain):
+        return PageColumn(name, unit, plain)
+    if not all(isinstance(value, float) and math.isfinite(value) for value in plain):
+        return PageColumn(name, unit, [_short(value) if isinstance(value, float) else value for value in plain])
+    return PageColumn(name, unit, list(map(float, ("%.6g " * len(plain) % tuple(plain)).split())))
 
 
 def _short(value: float) -> float | None:

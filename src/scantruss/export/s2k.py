@@ -27,6 +27,7 @@ VERTICAL = 1e-3  #: sine of the angle to z below which SAP2000 takes a member to
 S2K_FREEDOMS = ("U1", "U2", "U3", "R1", "R2", "R3")
 
 TableRow = dict[str, Any]  # field -> value
+TableColumns = dict[str, Any]  # field -> list with a value a row, or the value of all rows
 
 
 def encode_s2k(model: Model, style: FileStyle) -> bytes:
@@ -35,16 +36,29 @@ def encode_s2k(model: Model, style: FileStyle) -> bytes:
     if truss is None:
         raise FormatError("SAP2000 holds structures; make one of the grid with scantruss structure")
     lines = [f"$ {MARK}"]
-    fields: tuple[str, ...] = ()
-    form = ""
+    last = ""
     for name, rows in _tables(model, truss):
-        if rows:
+        if rows and name != last:
             lines += ["", f'TABLE:  "{name}"']
-        for row in rows:  # most rows have the fields of the one before
-            if (own := tuple(row)) != fields:
-                fields, form = own, "   " + "   ".join(f"{field}=%s" for field in own)
-            lines.append(form % tuple([repr(v) if type(v) is float else _text(v) for v in row.values()]))
+            last = name
+        lines += _lines_of_columns(rows) if isinstance(rows, dict) else _lines_of_rows(rows)
     return ("\r\n".join([*lines, "", "END TABLE DATA", ""])).encode("utf-8")
+
+
+def _lines_of_rows(rows: list[TableRow]) -> Iterator[str]:
+    for row in rows:
+        yield "   " + "   ".join(f"{field}={_text(value)}" for field, value in row.items())
+
+
+def _lines_of_columns(columns: TableColumns) -> Iterator[str]:
+    """Yield the lines of a long table: lists are its columns, numbers or words that are quoted already, others stand in each row."""
+    words = [f"{field}=%s" if isinstance(held, list) else f"{field}={_text(held)}" for field, held in columns.items()]
+    lists = [
+        map(repr, held) if held and type(held[0]) is float else held
+        for held in columns.values()
+        if isinstance(held, list)
+    ]
+    return map(("   " + "   ".join(words)).__mod__, zip(*lists, strict=True))
 
 
 def _text(value: Any) -> str:
@@ -70,10 +84,11 @@ def frame_angles(axes: np.ndarray) -> np.ndarray:
     return angles
 
 
-def _tables(model: Model, truss: Truss) -> Iterator[tuple[str, list[TableRow]]]:
+def _tables(model: Model, truss: Truss) -> Iterator[tuple[str, list[TableRow] | TableColumns]]:
     from ..structure.truss import GRAVITY
 
-    material, marks, members = truss.material, truss.node_marks, truss.member_marks
+    material = truss.material
+    marks, members = list(map(_quoted, truss.node_marks)), list(map(_quoted, truss.member_marks))
     turning = "No" if truss.pinned else "Yes"
     yield "PROGRAM CONTROL", [{"ProgramName": "SAP2000", "CurrUnits": "KN, m, C"}]
     yield (
@@ -118,31 +133,22 @@ def _tables(model: Model, truss: Truss) -> Iterator[tuple[str, list[TableRow]]]:
         ],
     )
     yield "GROUPS 1 - DEFINITIONS", [{"GroupName": name} for name in model.groups]
-    yield (
-        "JOINT COORDINATES",
-        [
-            {
-                "Joint": mark,
-                "CoordSys": "GLOBAL",
-                "CoordType": "Cartesian",
-                "XorR": x,
-                "Y": y,
-                "Z": z,
-                "SpecialJt": "No",
-            }
-            for mark, (x, y, z) in zip(marks, model.nodes.tolist(), strict=True)
-        ],
-    )
-    yield (
-        "CONNECTIVITY - FRAME",
-        [
-            {"Frame": mark, "JointI": marks[start], "JointJ": marks[end], "IsCurved": "No"}
-            for mark, (start, end) in zip(members, truss.members.tolist(), strict=True)
-        ],
-    )
+    x, y, z = model.nodes.T.tolist()
+    place = {
+        "Joint": marks,
+        "CoordSys": "GLOBAL",
+        "CoordType": "Cartesian",
+        "XorR": x,
+        "Y": y,
+        "Z": z,
+        "SpecialJt": "No",
+    }
+    yield "JOINT COORDINATES", place
+    start, end = ([marks[k] for k in ends] for ends in truss.members.T.tolist())
+    yield "CONNECTIVITY - FRAME", {"Frame": members, "JointI": start, "JointJ": end, "IsCurved": "No"}
     held = truss.supports[:, :3] if truss.pinned else truss.supports
     yield "JOINT RESTRAINT ASSIGNMENTS", [
-        {"Joint": marks[node]}
+        {"Joint": truss.node_marks[node]}
         | {way: "Yes" if np.isinf(value) else "No" for way, value in zip(S2K_FREEDOMS, held[node].tolist(), strict=False)}
         for node in np.flatnonzero(np.isinf(held).any(axis=1)).tolist()
     ]  # fmt: skip
@@ -150,41 +156,32 @@ def _tables(model: Model, truss: Truss) -> Iterator[tuple[str, list[TableRow]]]:
     yield (
         "JOINT SPRING ASSIGNMENTS 1 - UNCOUPLED",
         [
-            {"Joint": marks[node], "CoordSys": "GLOBAL"} | dict(zip(S2K_FREEDOMS, springs[node].tolist(), strict=False))
+            {"Joint": truss.node_marks[node], "CoordSys": "GLOBAL"}
+            | dict(zip(S2K_FREEDOMS, springs[node].tolist(), strict=False))
             for node in np.flatnonzero(springs.any(axis=1)).tolist()
         ],
     )
+    names = [_quoted(each.name) for each in truss.sections]
+    sections = [names[k] for k in truss.section_of.tolist()]
     yield (
         "FRAME SECTION ASSIGNMENTS",
-        [
-            {"Frame": mark, "AutoSelect": "N.A.", "AnalSect": truss.sections[section].name, "MatProp": "Default"}
-            for mark, section in zip(members, truss.section_of.tolist(), strict=True)
-        ],
+        {"Frame": members, "AutoSelect": "N.A.", "AnalSect": sections, "MatProp": "Default"},
     )
-    yield (
-        "FRAME LOCAL AXES ASSIGNMENTS 1 - TYPICAL",
-        [
-            {"Frame": mark, "Angle": angle, "AdvanceAxes": "No"}
-            for mark, angle in zip(members, frame_angles(truss.axes).tolist(), strict=True)
-        ],
-    )
+    angles = frame_angles(truss.axes).tolist()
+    yield "FRAME LOCAL AXES ASSIGNMENTS 1 - TYPICAL", {"Frame": members, "Angle": angles, "AdvanceAxes": "No"}
     ends = np.zeros_like(truss.end_stiffness) if truss.pinned else truss.end_stiffness
     loose = np.flatnonzero(np.isfinite(ends).any(axis=(1, 2))).tolist()
-    yield "FRAME RELEASE ASSIGNMENTS 1 - GENERAL", [_ends(members[k], ends[k], None) for k in loose]
+    yield "FRAME RELEASE ASSIGNMENTS 1 - GENERAL", [_ends(truss.member_marks[k], ends[k], None) for k in loose]
     partial = np.flatnonzero((np.isfinite(ends) & (ends > 0)).any(axis=(1, 2))).tolist()
-    yield "FRAME RELEASE ASSIGNMENTS 2 - PARTIAL FIXITY", [_ends(members[k], ends[k], 1e-3) for k in partial]
-    yield (
-        "GROUPS 2 - ASSIGNMENTS",
-        [
-            {"GroupName": model.groups[group], "ObjectType": "Frame", "ObjectLabel": mark}
-            for mark, group in zip(members, model.group_of.tolist(), strict=True)
-        ],
-    )
-    loads: dict[str, list[TableRow]] = {}
+    yield "FRAME RELEASE ASSIGNMENTS 2 - PARTIAL FIXITY", [_ends(truss.member_marks[k], ends[k], 1e-3) for k in partial]
+    groups = [_quoted(name) for name in model.groups]
+    grouped = [groups[k] for k in model.group_of.tolist()]
+    yield "GROUPS 2 - ASSIGNMENTS", {"GroupName": grouped, "ObjectType": "Frame", "ObjectLabel": members}
+    loads: dict[str, list[TableColumns]] = {}
     for case in truss.cases:
-        for name, row in _loads(truss, case):
-            loads.setdefault(name, []).append(row)
-    yield from loads.items()
+        for name, columns in _loads(truss, case, marks, members):
+            loads.setdefault(name, []).append(columns)
+    yield from ((name, columns) for name, own in loads.items() for columns in own)
     yield (
         "LOAD CASE DEFINITIONS",
         [
@@ -221,29 +218,29 @@ def _ends(mark: str, springs: np.ndarray, kilo: float | None) -> TableRow:
     return row
 
 
-def _loads(truss: Truss, case: LoadCase) -> Iterator[tuple[str, TableRow]]:
-    """Yield the table and the row of each load; weight is a factor of the load pattern."""
-    if case.nodal is not None:
-        forces = case.nodal / 1e3
-        for node in np.flatnonzero(forces.any(axis=1)).tolist():
-            row: TableRow = {"Joint": truss.node_marks[node], "LoadPat": case.name, "CoordSys": "GLOBAL"}
-            yield (
-                "JOINT LOADS - FORCE",
-                row | dict(zip(("F1", "F2", "F3", "M1", "M2", "M3"), forces[node].tolist(), strict=True)),
-            )
-    if case.line is not None:
-        for member, axis in np.argwhere(case.line).tolist():
-            value = float(case.line[member, axis]) / 1e3
-            yield "FRAME LOADS - DISTRIBUTED", {
-                "Frame": truss.member_marks[member], "LoadPat": case.name, "CoordSys": "GLOBAL", "Type": "Force", "Dir": "XYZ"[axis],
-                "DistType": "RelDist", "RelDistA": 0.0, "RelDistB": 1.0, "FOverLA": value, "FOverLB": value,
-            }  # fmt: skip
-    for member, change in enumerate(temperatures(truss, case, "SAP2000").tolist()):
-        if change:
-            row = {"Frame": truss.member_marks[member], "LoadPat": case.name, "Type": "Temperature", "Temp": change}
-            yield "FRAME LOADS - TEMPERATURE", row | {"JtPattern": "None"}
-    if case.settlement is not None:
-        moved = np.nan_to_num(case.settlement)
-        for node in np.flatnonzero(moved.any(axis=1)).tolist():
-            row = {"Joint": truss.node_marks[node], "LoadPat": case.name, "CoordSys": "GLOBAL"}
-            yield "JOINT LOADS - GROUND DISPLACEMENT", row | dict(zip(S2K_FREEDOMS, moved[node].tolist(), strict=False))
+def _loads(truss: Truss, case: LoadCase, joints: list[str], frames: list[str]) -> Iterator[tuple[str, TableColumns]]:
+    """Yield each table of the loads of a case, by the quoted marks; weight is a factor of the load pattern."""
+    on = {"LoadPat": case.name, "CoordSys": "GLOBAL"}
+    if case.nodal is not None and case.nodal.any():
+        own = np.flatnonzero(case.nodal.any(axis=1))
+        forces = dict(zip(("F1", "F2", "F3", "M1", "M2", "M3"), (case.nodal[own] / 1e3).T.tolist(), strict=True))
+        yield "JOINT LOADS - FORCE", {"Joint": [joints[k] for k in own.tolist()], **on, **forces}
+    if case.line is not None and case.line.any():
+        own, axes = np.nonzero(case.line)
+        load = (case.line[own, axes] / 1e3).tolist()
+        yield "FRAME LOADS - DISTRIBUTED", {
+            "Frame": [frames[k] for k in own.tolist()], **on, "Type": "Force", "Dir": ["XYZ"[k] for k in axes.tolist()],
+            "DistType": "RelDist", "RelDistA": 0.0, "RelDistB": 1.0, "FOverLA": load, "FOverLB": load,
+        }  # fmt: skip
+    change = temperatures(truss, case, "SAP2000")
+    if len(own := np.flatnonzero(change)):
+        yield "FRAME LOADS - TEMPERATURE", {
+            "Frame": [frames[k] for k in own.tolist()], "LoadPat": case.name, "Type": "Temperature", "Temp": change[own].tolist(),
+            "JtPattern": "None",
+        }  # fmt: skip
+    if case.settlement is not None and len(own := np.flatnonzero(np.nan_to_num(case.settlement).any(axis=1))):
+        moved = np.nan_to_num(case.settlement)[own].T.tolist()
+        yield (
+            "JOINT LOADS - GROUND DISPLACEMENT",
+            {"Joint": [joints[k] for k in own.tolist()], **on} | dict(zip(S2K_FREEDOMS, moved, strict=False)),
+        )

@@ -10,7 +10,7 @@ import json
 import math
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from .truss import Combination, LoadCase, Truss
 
 STRUCTURE_FORMAT = "scantruss-structure"
 STRUCTURE_VERSION = 1
+ROW_A_LINE = (",\n", ": ")  #: separators of JSON that put each value of a plain list on a line of its own
 UNITS_WRITTEN = {"length": "m", "force": "N", "mass": "kg"}
 _ARRAYS = {  # of the record: columns and type
     "nodes": (3, float), "members": (2, int), "triangles": (3, int), "node_normals": (3, float), "member_normals": (3, float),
@@ -61,11 +62,11 @@ def encode_structure(truss: Truss, solution: Solution | None = None, report: Str
         values["results"] = [
             {
                 "name": case.name,
-                "displacements": case.displacements,
+                "displacements": Results(case.displacements),
                 "reactions": {
                     truss.node_marks[n]: case.reactions[n] for n in np.flatnonzero(case.reactions.any(axis=1))
                 },
-                "axial": case.axial,
+                "axial": Results(case.axial),
             }
             for case in solution.cases
         ]
@@ -87,10 +88,42 @@ def _text(value: Any) -> str:
         if value.dtype.kind == "f" and not np.isfinite(value).all():
             rows = rows.replace("-inf", "inf").replace("inf", '"rigid"').replace("nan", "null")
         return f"[\n{rows}\n]"
-    plain = _plain(value)
-    if isinstance(plain, list) and len(plain) > 6:
-        return "[\n" + ",\n".join(json.dumps(row, allow_nan=False, ensure_ascii=False) for row in plain) + "\n]"
-    return json.dumps(plain, allow_nan=False, ensure_ascii=False)
+    if isinstance(value, list) and len(value) > 6:
+        if all(type(row) is str for row in value):  # at once: as quick as one row alone
+            return f"[\n{json.dumps(value, ensure_ascii=False, separators=ROW_A_LINE)[1:-1]}\n]"
+        return "[\n" + ",\n".join(map(_inline, value)) + "\n]"
+    return _inline(value)
+
+
+class Results(NamedTuple):
+    """A (K, C) table of numbers that is not read back, so that the sign of a 0 may be lost."""
+
+    values: np.ndarray
+
+    def __str__(self) -> str:
+        """Return JSON in one line, by pyarrow, which turns numbers into text four times as fast as Python."""
+        import pyarrow as pa
+
+        words = pa.array(self.values.ravel()).cast(pa.string()).to_pylist()
+        row = f"[{', '.join(['%s'] * self.values.shape[1])}]"
+        return f"[{', '.join([row] * len(self.values))}]" % tuple(words)
+
+
+def _inline(value: Any) -> str:
+    """Return JSON of a value in one line."""
+    if isinstance(value, Results):
+        return str(value)
+    if isinstance(value, np.ndarray) and value.dtype.kind in "if" and np.isfinite(value).all():
+        return str(value.tolist())
+    if isinstance(value, dict):
+        return (
+            "{"
+            + ", ".join(f"{json.dumps(key, ensure_ascii=False)}: {_inline(each)}" for key, each in value.items())
+            + "}"
+        )
+    if isinstance(value, list | tuple):
+        return "[" + ", ".join(map(_inline, value)) + "]"
+    return json.dumps(_plain(value), allow_nan=False, ensure_ascii=False)
 
 
 def _plain(value: Any) -> Any:

@@ -115,7 +115,9 @@ class CaseResult:
     @cached_property
     def axial(self) -> np.ndarray:
         """(M, 2) smallest and greatest axial force of each member, tension positive [N]."""
-        return np.stack([self.along[:, :, 0].min(axis=1), self.along[:, :, 0].max(axis=1)], axis=1)
+        change = self.line[:, 0] * self.truss.lengths / 2  # linear along a member, so that its ends have the extremes
+        middle = self.natural[:, LENGTHEN]
+        return np.stack([middle - np.abs(change), middle + np.abs(change)], axis=1)
 
     @property
     def stresses(self) -> np.ndarray:
