@@ -1,6 +1,8 @@
 """What a grid, a cloud and settings say of themselves, and their pictures in notebooks."""
 
+import json
 from collections.abc import Callable
+from html import unescape
 from typing import Any
 
 import numpy as np
@@ -52,3 +54,11 @@ def test_a_notebook_shows_a_grid_to_turn() -> None:
         text.startswith('<iframe srcdoc="&lt;!doctype html&gt;') and text.count("<") == 2
     )  # all of the page is escaped
     assert f"{len(grid.edges):,} members" in text and "http" not in text.lower().replace("http-equiv", "")
+
+
+def test_a_notebook_shows_a_scan_to_turn() -> None:
+    points = np.random.default_rng(4).uniform(0, 1, (400, 3)) * [8.0, 6.0, 1.0] + [4.5e5, 5.3e6, 0.0]
+    text = unescape(st.PointCloud.from_array(points, unit="m", name="hall.ply").show()._repr_html_())
+    assert text.startswith("<iframe") and "400 of 400 points are drawn, in m" in text
+    data = json.loads(text.partition('id="data">')[2].partition("</script>")[0])
+    assert data["nodes"] == "" and len(data["home"]) == 400 and np.ptp(np.array(data["home"])[:, 0]) < 8.0

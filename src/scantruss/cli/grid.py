@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from argparse import Namespace
 from collections.abc import Sequence
 from pathlib import Path
@@ -49,7 +50,11 @@ def grid_parser() -> Parser:
         "--settings", metavar="FILE", help="settings saved beside an earlier result; options given here take precedence"
     )
     files.add_argument("--fixed-file", metavar="FILE", help="positions that must become nodes, one X,Y,Z per line")
-    files.add_argument("--report", metavar="FILE.json", help="save all figures of the run")
+    files.add_argument(
+        "--report",
+        metavar="FILE.json|FILE.html",
+        help="save all figures of the run, or a page with 3D view, tables, plots, certificate and settings",
+    )
     files.add_argument(
         "--keep-failed",
         action="store_true",
@@ -114,11 +119,22 @@ def grid(values: Namespace) -> None:
     with Bars() as bars, SaveTogether("" if values.force else "result") as save:
         written = write_models(model_of(result, cloud=cloud), outs, save, bars, style)
         save.json(settings_file, (result.settings or settings).to_dict())
-        if report is not None:
+        if report is not None and report.suffix.lower() == ".html":
+            from ..report.grid_page import encode_grid_report
+
+            save.beside(report).write_bytes(encode_grid_report(result, cloud, command_line_of(values)))
+        elif report is not None:
             save.json(report, report_of(result, len(cloud.points)))
     show_grid(result, len(cloud.points), [*written, settings_file, *([report] if report else [])])
     if result.certificate is not None and not result.certificate.passed:
         raise CertificateError("the grid fails its certificate, and was written because of --keep-failed")
+
+
+def command_line_of(values: Namespace) -> str:
+    """Return the command line that repeats this run with the settings that are saved beside its results."""
+    outs = [str(out) for out in outs_of(values)]
+    settings = str(outs_of(values)[0].with_suffix(".settings.json"))
+    return shlex.join(["scantruss", "grid", values.scan, *outs, "--settings", settings])
 
 
 def check_outputs(values: Namespace, outs: list[Path], settings_file: Path, report: Path | None) -> None:
@@ -135,7 +151,7 @@ def check_outputs(values: Namespace, outs: list[Path], settings_file: Path, repo
                 check_ours(out, "result")
     claim_models([check_output(out) for out in outs], taken, force=values.force, what="grid")
     if report is not None:
-        claim(check_place(report, (".json",)), "report", taken, force=values.force)
+        claim(check_place(report, (".json", ".html")), "report", taken, force=values.force)
     check_place(settings_file, (".json",))
     if taken.get(settings_file.resolve(), "settings") != "settings":  # a run may repeat the settings it saved itself
         raise FormatError(f"{settings_file} is where the settings of this run are saved; name another file")

@@ -71,7 +71,7 @@ def structure_parser() -> Parser:
     add_outs(
         parser, "structure with its results; the suffix names the format; report to read .html .pdf, picture .png", "*"
     )
-    parser.add_argument("--report", metavar="FILE", help="figures as .json, in m, N and kg")
+    parser.add_argument("--report", metavar="FILE", help="figures as .json, in m, N and kg; a page to read as .html")
     parser.add_argument(
         "--settings", metavar="FILE", help="all of this in a .toml or .json file, and combinations and limits"
     )
@@ -94,7 +94,7 @@ def structure(values: Namespace) -> None:
     outs = [check_output(out, STRUCTURE, also=REPORT_SUFFIXES) for out in outs_of(values)]
     if not Path(values.grid).exists():
         raise InputError(f"there is no file {values.grid}; structure needs a grid saved as .json by scantruss grid")
-    report_place = None if values.report is None else check_place(values.report, (".json",))
+    report_place = None if values.report is None else check_place(values.report, (".json", ".html"))
     plot = None if values.path_plot is None else check_place(values.path_plot, (".png",))
     settings = structure_settings(values)
     if plot is not None and not settings.path:
@@ -148,7 +148,9 @@ def structure(values: Namespace) -> None:
             if out not in models:
                 save.beside(out).write_bytes(_encoded(out, values, settings, solution, report))
                 written.append(out)
-        if report_place is not None:
+        if report_place is not None and report_place.suffix.lower() == ".html":
+            save.beside(report_place).write_bytes(_encoded(report_place, values, settings, solution, report))
+        elif report_place is not None:
             save.json(report_place, report.to_dict())
         if plot is not None and path is not None:
             save.beside(plot).write_bytes(encode_path(path))

@@ -89,16 +89,17 @@
     return { back, right, up };
   };
   const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-  const goHome = () => { // as near as all nodes fit into the view, in its middle
+  const home = data.home ? data.home.map((place) => place.map((value, j) => value - middle[j])) : Array.from({ length: counts.nodes }, (_, k) => at(k));
+  const goHome = () => { // as near as all nodes, or the bulk of a scan alone, fit into the view, in its middle
     camera = { target: [0, 0, 0], distance: 0.01 * size, turn: -0.9, rise: 0.75 }; atHome = true;
     const { back, right, up } = axes(), wide = canvas.width / canvas.height, fit = Math.min(1, wide) * FOCAL / MARGIN;
     for (let step = 0; step < 4; step++) {
-      const each = Array.from({ length: counts.nodes }, (_, k) => at(k).map((value, j) => value - camera.target[j]));
+      const each = home.map((place) => place.map((value, j) => value - camera.target[j]));
       const seen = each.map((p) => [dot(back, p), dot(right, p), dot(up, p)]);
       camera.distance = seen.reduce((most, [z, x, y]) => Math.max(most, z + Math.max(Math.abs(x) * fit / wide, Math.abs(y) * fit)), 0.01 * size);
       const middleOf = (j) => {
         const ends = seen.reduce(([a, b], p) => { const v = p[j] / (camera.distance - p[0]); return [Math.min(a, v), Math.max(b, v)]; }, [Infinity, -Infinity]);
-        return counts.nodes && step < 3 ? camera.distance * (ends[0] + ends[1]) / 2 : 0;
+        return home.length && step < 3 ? camera.distance * (ends[0] + ends[1]) / 2 : 0;
       };
       const x = middleOf(1), y = middleOf(2);
       camera.target = camera.target.map((value, j) => value + x * right[j] + y * up[j]);

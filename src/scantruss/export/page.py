@@ -18,6 +18,7 @@ from ..errors import words_of_number
 from ..grid.certificate import near
 from ..grid.grid import Grid
 from ..runtime.ours import MARK
+from ..scan.checks import usual_extent
 from ..scan.cloud import PointCloud
 from ..structure.report import use_words
 from .model import Model, model_of_grid
@@ -25,6 +26,7 @@ from .page_tables import Pin, colorings_of, pins_of, tables_of
 from .style import PAGE_POINTS, FileStyle
 
 PAGE_FOLDER = Path(__file__).parent
+POINTS_TO_FIT = 1000  #: of a scan, which fit into its first view
 NOTEBOOK_HEIGHT = 640  #: of a page within a notebook [pixel]
 PAGE_LAYERS = (("members", True), ("nodes", True), ("panels", True), ("scan", False), ("pins", True))
 
@@ -51,23 +53,26 @@ def encode_page(model: Model, style: FileStyle) -> bytes:
         "colorings": colorings_of(tables),
         "places": [{"words": f"{pin.words} {pin.value}".strip(), "where": (np.array(pin.where) - model.origin).tolist()} for pin in pins],
         "reach": mean,
+        **({} if len(model.local) else {"home": _bulk(model)}),
     }  # fmt: skip
-    what = "structure" if grid is None else "grid"
-    title = f"Grid truss, {len(model.local):,} nodes" if grid is not None else f"Structure, {len(model.local):,} nodes"
+    is_scan = not len(model.local)
+    what = "scan" if is_scan else "structure" if grid is None else "grid"
+    title, below = _head_lines(model, what)
+    hidden = " hidden" * is_scan
     parts = [
         f"<h1>{escape(title)}</h1>",
-        f'<p class="below">{len(model.members):,} members, {len(model.panels):,} panels'
-        f"{f', in {model.unit}' if model.unit else ''}</p>",
-        '<h2><label for="coloring">Colour</label></h2><select id="coloring"></select><p>',
+        f'<p class="below">{escape(below)}</p>',
+        f'<h2{hidden}><label for="coloring">Colour</label></h2><select id="coloring"{hidden}></select><p>',
         *(
-            f'<label><input type="checkbox" id="show-{name}"{" checked" * on}> {name}</label>'
+            f'<label{" hidden" * (is_scan and name != what)}><input type="checkbox" id="show-{name}"'
+            f"{' checked' * (on or name == what)}> {name}</label>"
             for name, on in PAGE_LAYERS
         ),
-        '</p><h2><label for="mark">Selected</label></h2>',
-        '<input type="search" id="mark" placeholder="mark, such as M0001" autocomplete="off">',
-        '<div id="row" aria-live="polite"></div>',
+        f'</p><h2{hidden}><label for="mark">Selected</label></h2>',
+        f'<input type="search" id="mark" placeholder="mark, such as M0001" autocomplete="off"{hidden}>',
+        f'<div id="row" aria-live="polite"{hidden}></div>',
         _certificate(model, pins),
-        f"<h2>Figures</h2>{_table(_figures(model))}",
+        "" if is_scan else f"<h2>Figures</h2>{_table(_figures(model))}",
         _settings(model),
         '<details><summary>Keys and gestures</summary><p class="note">Drag: turn. Shift or right button and drag, or two'
         " fingers: move. Wheel, pinch, + and -: nearer, farther. Arrows: turn, with shift: move. Home: all of it."
@@ -89,6 +94,21 @@ def encode_page(model: Model, style: FileStyle) -> bytes:
     ).encode()
 
 
+def _head_lines(model: Model, what: str) -> tuple[str, str]:
+    """Return the title of a page and the line below it."""
+    unit = f", in {model.unit}" if model.unit else ""
+    if what == "scan":
+        cloud = model.cloud
+        drawn = (
+            ""
+            if cloud is None
+            else f"{min(len(cloud.points), PAGE_POINTS):,} of {len(cloud.points):,} points are drawn"
+        )
+        return (cloud.name if cloud is not None else "") or "Scan", f"{drawn}{unit}"
+    title = f"{'Grid truss' if what == 'grid' else 'Structure'}, {len(model.local):,} nodes"
+    return title, f"{len(model.members):,} members, {len(model.panels):,} panels{unit}"
+
+
 class PageView:
     """A page within a notebook."""
 
@@ -103,6 +123,16 @@ class PageView:
 def view_of_grid(grid: Grid, cloud: PointCloud | None = None) -> PageView:
     """Return the page of a grid for a notebook."""
     return PageView(encode_page(model_of_grid(grid, cloud), FileStyle()))
+
+
+def view_of_cloud(cloud: PointCloud) -> PageView:
+    """Return the page of a scan for a notebook."""
+    none, names = np.zeros((0, 3), np.int64), tuple[str, ...]()
+    model = Model(
+        local=np.zeros((0, 3)), origin=np.asarray(cloud.origin, np.float64), members=none[:, :2], triangles=none, panels=none,
+        unit=cloud.unit, node_marks=names, member_marks=names, panel_marks=names, groups=names, group_of=none[:, 0], cloud=cloud,
+    )  # fmt: skip
+    return PageView(encode_page(model, FileStyle()))
 
 
 def _own(name: str) -> str:
@@ -123,6 +153,17 @@ def _scan(model: Model) -> dict[str, Any]:
     low, high = points.min(axis=0), points.max(axis=0)
     share = (points - low) / np.where(high > low, high - low, 1.0)
     return {"points": _packed(np.rint(65535 * share), "<u2"), "low": low.tolist(), "high": high.tolist()}
+
+
+def _bulk(model: Model) -> list[list[float]]:
+    """Return some points of the scan, without those far from most others, relative to the origin of the model."""
+    if model.cloud is None:
+        return []
+    low, high = usual_extent(model.cloud.points)
+    some = model.cloud.points[:: max(1, len(model.cloud.points) // POINTS_TO_FIT)]
+    inside = some[((some >= low) & (some <= high)).all(axis=1)] + (model.cloud.origin - model.origin)
+    places: list[list[float]] = inside.tolist()
+    return places
 
 
 def _table(rows: Sequence[tuple[str, str]]) -> str:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import cached_property
+from importlib import import_module
+from typing import Any
 
 import numpy as np
 
@@ -87,6 +89,10 @@ class PointCloud:
     def gap(self) -> float:
         """Typical distance to the sixth neighbour [scan unit]; measured once."""
         return measure_gap(self.points)
+
+    def show(self) -> Any:
+        """Return the scan as a view that a notebook shows: turn it, come nearer; nothing is loaded."""
+        return import_module("scantruss.export.page").view_of_cloud(self)  # a layer above this one
 
     @classmethod
     def from_array(

@@ -16,7 +16,7 @@ SECOND = "#c1662b"  #: colour of the second axis
 
 def draw_rounds(figure: Any, place: Frame, rounds: Sequence[SizingRound]) -> None:
     """Draw mass and greatest utilization over the rounds of sizing."""
-    axes = _axes(figure, place, "round", "mass [t]")
+    axes = chart_axes(figure, place, "round", "mass [t]")
     numbers = range(1, len(rounds) + 1)
     axes.plot(numbers, [each.mass / 1e3 for each in rounds], "o-", color=tuple(INK), markersize=4, linewidth=1.4)
     axes.set_ylim(bottom=0)
@@ -31,7 +31,7 @@ def draw_rounds(figure: Any, place: Frame, rounds: Sequence[SizingRound]) -> Non
 
 def draw_weights(figure: Any, place: Frame, weights: dict[int, float]) -> None:
     """Draw mass over the number of different sections."""
-    axes = _axes(figure, place, "different sections at most", "mass [t]")
+    axes = chart_axes(figure, place, "different sections at most", "mass [t]")
     axes.bar(list(weights), [mass / 1e3 for mass in weights.values()], width=0.5, color=(0.345, 0.525, 0.620))
     for count, mass in weights.items():
         axes.annotate(
@@ -43,12 +43,12 @@ def draw_weights(figure: Any, place: Frame, weights: dict[int, float]) -> None:
 
 def draw_nonlinear_path(figure: Any, place: Frame, path: Path) -> None:
     """Draw load factors over the displacement of the node that moves most."""
-    axes = _axes(figure, place, moves_label(path), "load factor", whole=False)
+    axes = chart_axes(figure, place, moves_label(path), "load factor", whole=False)
     draw_path(axes, path)
     axes.spines[["right"]].set_visible(False)
 
 
-def _axes(figure: Any, place: Frame, across: str, up: str, whole: bool = True) -> Any:
+def chart_axes(figure: Any, place: Frame, across: str, up: str, whole: bool = True) -> Any:
     """Return axes, with whole numbers across where asked for."""
     from matplotlib.ticker import MaxNLocator
 
