@@ -36,6 +36,13 @@ def settings_of_triangles(settings: Settings) -> Settings:
     return settings
 
 
+def judging_settings(settings: Settings) -> Settings:
+    """Return the settings by which a certificate judges: members of the boundary of hexagons are as long as those of the triangles."""
+    if settings.cells == "hexagon":
+        return settings.replace(max_length=TRIANGLE_MEMBER * settings.max_length)
+    return settings
+
+
 def with_cells(
     grid: Grid,
     samples: SurfaceSamples,
@@ -69,11 +76,7 @@ def with_cells(
 
     make = quads_of if settings.cells == "quad" else hexagons_of
     made = make(grid, samples, boundary, constraints, settings, progress=progress)
-    judged = settings
-    if (
-        settings.cells == "hexagon"
-    ):  # members of the boundary are as long as those of the triangles; the certificate says so
-        judged = settings.replace(max_length=TRIANGLE_MEMBER * settings.max_length)
+    judged = judging_settings(settings)
     if not settings.planar:
         return certified(made.replace(settings=settings), samples, boundary, judged)
     surface = with_own_scratch(samples.surface)

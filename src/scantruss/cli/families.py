@@ -89,6 +89,7 @@ def families(values: Namespace) -> None:
 def _certified(before: Grid, made: Grid, values: Namespace) -> Grid:
     """Return the grid with a certificate of the scan."""
     from ..boundary.find import find_boundary
+    from ..cells.make import judging_settings, settings_of_triangles
     from ..check.certify import certify
     from ..grid.certificate import check_passed
     from ..scan.formats.reading import read_points
@@ -97,9 +98,10 @@ def _certified(before: Grid, made: Grid, values: Namespace) -> Grid:
     if (settings := before.settings) is None:
         raise InputError(f"{values.grid} does not say with which settings it was made; leave --scan out")
     cloud = read_points(values.scan, settings.unit, settings.selection)
-    samples, boundary = find_boundary(sample_surface(cloud, settings), settings)
+    plain = settings_of_triangles(settings)
+    samples, boundary = find_boundary(sample_surface(cloud, plain), plain)
     moved = made.replace(nodes=made.nodes + (made.origin - samples.origin), origin=samples.origin)
-    certificate = certify(moved, samples, boundary, settings)
+    certificate = certify(moved, samples, boundary, judging_settings(settings))
     moved = moved.replace(certificate=certificate)
     check_passed(moved, values.keep_failed)
     return moved

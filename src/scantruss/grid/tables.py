@@ -109,20 +109,17 @@ class GridTables:
     @cached_property
     def edge_triangles(self) -> np.ndarray:
         """(E, 2) the triangles at each member, -1 where the boundary is; (E, 2) needs a manifold grid."""
-        if self.panels is not None:
-            every: np.ndarray = self.triangulated.edge_triangles[self._member_of_side >= 0]
-            return every
-        _, edges, inverse = self._half_edges
+        _, sides, inverse = self._half_edges
         triangle = np.tile(np.arange(len(self.triangles)), 3)
         order = np.argsort(inverse, kind="stable")
-        count = self.edge_uses
+        count = np.bincount(inverse, minlength=len(sides))
         start = np.cumsum(count) - count
-        table = np.full((len(edges), 2), -1, np.int64)
+        table = np.full((len(sides), 2), -1, np.int64)
         used = count > 0
         table[used, 0] = triangle[order[start[used]]]
         two = count > 1
         table[two, 1] = triangle[order[start[two] + 1]]
-        return table
+        return table if self.panels is None else table[self._member_of_side >= 0]
 
     @cached_property
     def edge_panels(self) -> np.ndarray:
@@ -140,7 +137,9 @@ class GridTables:
         table = self.panel_table
         sides, count = np.sort(sides_of(table), axis=1), max(len(self.nodes), 1)
         found = np.full(table.shape, -1)
-        found[table >= 0] = np.searchsorted(self.edges @ [count, 1], sides @ [count, 1])
+        keys = np.sort(self.edges, axis=1) @ [count, 1]
+        order = np.argsort(keys, kind="stable")
+        found[table >= 0] = order[np.searchsorted(keys[order], sides @ [count, 1])]
         return found
 
     @cached_property

@@ -66,17 +66,17 @@ def double_layer(
     grid : Grid
         Its normals point away from the second layer.
     depth : float or sequence of float
-        From the nodes of the grid, or the middles of its triangles, to the second layer; of several from each layer to the next
+        From the nodes of the grid, or the middles of its panels, to the second layer; of several from each layer to the next
         [unit of the grid].
     second : str
         "same": a node under each node, joined by a vertical; each member of the grid has one under it, and a diagonal from its lower
-        node on the grid to the node under its higher one. The members cut the space into tetrahedra. "dual": a node under each
-        triangle, joined with its corners and with the nodes under its neighbours; a third layer is under the grid again, and so on.
+        node on the grid to the node under its higher one. Under triangles the members cut the space into tetrahedra. "dual": a node
+        under each panel, joined with its corners and with the nodes under its neighbours; a third layer is under the grid again, and so on.
     along : str
         "normal", along the smoothed normals, or "vertical", along z.
     edges : str
         "tapered": both layers meet at the boundary; "closed": by verticals at the boundary; "" is tapered of the dual, else closed.
-        Layers that are the same meet in the nodes of the boundary, but for corners of triangles that have no inner node.
+        Layers that are the same meet in the nodes of the boundary, but for corners of panels that have no inner node.
     bends : str
         "refuse" a depth that is too much where the grid bends, or "reduce" it there, to a fifth at least.
 
@@ -99,12 +99,8 @@ def double_layer(
             raise InputError(f"the depth of a double layer must be positive, got {each!r}")
     if not 1 <= len(depths) < MOST_LAYERS:
         raise InputError(f"a grid can have 2 to {MOST_LAYERS} layers, got {len(depths)} depths")
-    if grid.panels is not None:
-        raise InputError(
-            f"a double layer needs a grid of triangles, and this one has {grid.panels_are}; make it with --cells triangle"
-        )
     if len(grid.triangles) == 0 or not (grid.topology.manifold and grid.topology.orientable):
-        raise InputError("a double layer needs a manifold, oriented grid with triangles")
+        raise InputError("a double layer needs a manifold, oriented grid with panels")
     normals = smoothed_normals(grid)
     down = -normals if along == "normal" else np.tile([0.0, 0.0, -1.0], (len(grid.nodes), 1))
     _check_gap(grid, down, sum(depths))
@@ -132,7 +128,7 @@ def _named(
     webs = [WEB] if count == 2 else [f"{WEB} {number}" for number in range(1, count)]
     starts = np.cumsum([0, *map(len, parts.chords), *map(len, parts.webs)]).tolist()
     groups = {name: np.arange(*starts[k : k + 2]) for k, name in enumerate([*names, *webs])}
-    below = units(normals[parts.owners].mean(axis=1))
+    below = units(parts.means(normals))
     below[: len(normals)] = normals
     return DoubleLayer(
         nodes=nodes,
@@ -149,23 +145,23 @@ def _places(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the nodes of all layers, and which share of the depth each has."""
     depth = np.cumsum([0.0, *depths])[parts.layer]
-    shares = np.where(parts.layer > 0, share[parts.owners].mean(axis=1), 1.0)
-    way = units(down[parts.owners].mean(axis=1))
-    alone = (parts.owners == parts.owners[:, :1]).all(axis=1)
-    base = np.where(alone[:, None], grid.nodes[parts.owners[:, 0]], grid.nodes[parts.owners].mean(axis=1))
+    shares = np.where(parts.layer > 0, parts.means(share), 1.0)
+    way = units(parts.means(down))
+    alone = (parts.owners >= 0).sum(axis=1) == 1
+    base = np.where(alone[:, None], grid.nodes[parts.owners[:, 0]], parts.means(grid.nodes))
     way[alone] = down[parts.owners[alone, 0]]
     return base + (depth * shares)[:, None] * way, shares
 
 
 def _too_deep(parts: LayerParts, grid: Grid, nodes: np.ndarray) -> tuple[np.ndarray, str] | None:
     """Return the nodes of the grid where it bends too sharply for the depth, and what would happen; None where it does not."""
-    base = grid.nodes[parts.owners].mean(axis=1)
+    base = parts.means(grid.nodes)
     turned = []
     for chords in parts.chords[1:]:
         step, under_step = (places[chords[:, 1]] - places[chords[:, 0]] for places in (base, nodes))
         turned.append(chords[(step * under_step).sum(axis=1) < LEAST_CHORD * (step**2).sum(axis=1)])
     if len(at := np.concatenate(turned)):
-        return np.unique(parts.owners[at]), "the second layer would fold" if len(turned) == 1 else "a layer would fold"
+        return parts.owners_of(at), "the second layer would fold" if len(turned) == 1 else "a layer would fold"
     members = np.concatenate([*parts.chords, *parts.webs])
     from .clearance import close_pairs
 
@@ -173,7 +169,7 @@ def _too_deep(parts: LayerParts, grid: Grid, nodes: np.ndarray) -> tuple[np.ndar
     if len(pairs):
         ends = members[pairs].ravel()
         own = ends[ends < len(grid.nodes)]
-        return np.unique(own if len(own) else parts.owners[ends]), "members of both layers would cross"
+        return (np.unique(own) if len(own) else parts.owners_of(ends)), "members of both layers would cross"
     return None
 
 

@@ -12,6 +12,7 @@ from scipy.sparse.linalg import spsolve
 
 from ..errors import InputError
 from ..grid.grid import Grid
+from ..grid.panels import triangles_of
 from .double_layer import smoothed_normals
 
 FAMILY_ROUNDS = 200  #: of assignment and relaxation
@@ -106,10 +107,6 @@ def few_lengths(grid: Grid, tolerance: float, count: int) -> Families:
         raise InputError(f"the tolerance of families is a share of the mean member, 0.01% to 20%, got {tolerance!r}")
     if count < 1:
         raise InputError(f"the number of families must be 1 or more, got {count}")
-    if grid.panels is not None:
-        raise InputError(
-            f"families need a grid of triangles, and this one has {grid.panels_are}; make it with --cells triangle"
-        )
     if len(grid.edges) == 0 or not grid.topology.manifold:
         raise InputError("families of members need a manifold grid with members")
     mean = float(grid.lengths.mean())
@@ -134,6 +131,8 @@ def few_lengths(grid: Grid, tolerance: float, count: int) -> Families:
         place *= np.minimum(1.0, FARTHEST_MOVE * mean / np.maximum(size, 1e-300))
         nodes = _positions(grid.nodes, place, frames, quadrics, HIGHEST_RISE * mean)
     made = grid.replace(nodes=best, deviation=None)
+    if made.panels is not None:  # which are cut along their shortest diagonals
+        made = made.replace(triangles=triangles_of(best, made.panels), panels=made.panels)
     middles = _middles(made.lengths, tolerance * mean, count, len(made.lengths))
     of = np.abs(made.lengths[:, None] - middles).argmin(axis=1)
     return Families(made, middles, of, made.lengths - middles[of], np.linalg.norm(best - grid.nodes, axis=1))

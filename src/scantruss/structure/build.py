@@ -90,7 +90,7 @@ def truss_of_grid(
     )
     held = support_nodes(truss, supports)
     if layered:
-        outer = grid.replace(nodes=nodes, triangles=triangles, origin=truss.origin, unit="m")
+        outer = grid.replace(nodes=nodes, triangles=triangles, panels=truss.panels, origin=truss.origin, unit="m")
         layers = make_double_layer(
             outer, _depths(double_layer), second=second_layer, along=depth_along, edges=layer_edges, bends=sharp_bends
         )

@@ -20,6 +20,7 @@ def grid_of_layers(truss: Truss, scale: float = 1.0) -> LayeredGrid:
     return LayeredGrid(
         nodes=truss.nodes / scale,
         triangles=truss.triangles,
+        panels=truss.panels,
         fixed=fixed,
         origin=truss.origin / scale,
         unit="m",
