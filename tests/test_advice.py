@@ -168,7 +168,7 @@ def test_a_suggestion_and_its_table_cost_no_more_than_so_many_grids_and_points(
     assert "no length passes of those tried" in capsys.readouterr().out
     assert sum(max(1.0, (usual / length) ** 2) for length in made) <= MOST_TRIED + TRIED_AROUND
     made = counted_runs(monkeypatch, lambda length: False)
-    monkeypatch.setattr("scantruss.report.advice.MOST_LOOKED_AT", 1)
+    monkeypatch.setattr("scantruss.report.advice.POINTS_LOOKED_AT", 1)
     Advice(cloud_of("limpet"), st.Settings(length=1.0)).suggest()
     assert 1 <= len(made) <= LEAST_TRIED
 

@@ -56,7 +56,7 @@ NEARBY_LENGTHS = (
 SURE_PER_SPACING = 8.0
 MOST_LOST = 0.01  # share of the scan that may be lost at a length that is suggested
 MOST_TRIED = 20.0  # grids that are made for a suggestion, or to find a length nearby, each counted by its cost
-MOST_LOOKED_AT = 2_000_000  # points that are looked at for that
+POINTS_LOOKED_AT = 2_000_000  # points that are looked at for that
 LEAST_TRIED = 5.0  # grids that are made for that even where the scan has more points
 TRIED_AROUND = 6.0  # grids that are made besides for the lengths of the table, one each
 TRIED_USUAL = 4.0  # grids that are made at the usual length where no length nearby passes and it is far away
@@ -119,7 +119,7 @@ class Advice:
         """Allow so many grids from now on, or fewer where the scan is large; a shorter length costs more than one that counts once."""
         self._counted_at = length
         cost = len(self._cloud.points) + POINTS_PER_MEMBER * self.members(length)
-        self._left = min(most, max(LEAST_TRIED, MOST_LOOKED_AT / cost))
+        self._left = min(most, max(LEAST_TRIED, POINTS_LOOKED_AT / cost))
 
     def try_length(self, length: float, most: int = SOME_MORE) -> LengthTrial | None:
         """Return what comes of a length; None where that was not tried: it is out of range, takes too many members, or enough was tried.
