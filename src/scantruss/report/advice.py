@@ -38,6 +38,7 @@ SHORTER_FIRST = (
     (1 / 1.4, A_FEW), (1.4, A_FEW), (0.5, A_FEW), (1.0, SOME_MORE), (2.0, A_FEW), (1 / 1.4, SOME_MORE), (1.4, SOME_MORE),
     (2.8, A_FEW), (2.0, SOME_MORE),
 )  # fmt: skip
+NEARLY_NEXT = 1.45  # ratio of lengths that pass up to which the longer one stands for the next to the shorter
 NEXT_LENGTH = 1.4  # a length is suggested if that many times it passes too
 NEARBY_LENGTHS = (
     1.12,
@@ -179,7 +180,8 @@ class Advice:
         """Return the length to take.
 
         It is the first of those tried in turn that passes with what is next above it, both without much of the scan lost; else of
-        those that pass with what is next above them the one that loses least; else one that passes; else the usual length.
+        those that pass with what is next above them the one that loses least; else one that passes, if there is one with another
+        not far above it that passes too; else the usual length.
         """
         self.is_spent = True
         low, high = length_range(self._cloud)
@@ -196,9 +198,9 @@ class Advice:
                     return length
         if both:
             return min(both, key=lambda length: both[length])
-        return min(
-            (trial.length for trial in self.tried if trial.passed), key=self._far_from_usual, default=self._usual
-        )
+        passing = [trial.length for trial in self.tried if trial.passed]
+        followed = [one for one in passing if any(one < other <= NEARLY_NEXT * one for other in passing)]
+        return min(followed or passing, key=self._far_from_usual, default=self._usual)
 
     def _ladder(self) -> Iterator[tuple[float, int]]:
         """Yield the lengths to try in turn, as multiples of the usual one, with how many grids are made of each."""
