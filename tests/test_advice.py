@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ import scantruss as st
 from scantruss import pipeline
 from scantruss.candidates import Attempt
 from scantruss.cli.main import main
-from scantruss.report.advice import LEAST_TRIED, MOST_TRIED, SURE_PER_SPACING, TRIED_AROUND, Advice
+from scantruss.report.advice import LEAST_TRIED, MOST_TRIED, SURE_PER_SPACING, TRIED_AROUND, Advice, LengthTrial
 from scantruss.scan.member_length import length_range, round_length
 from scantruss.surface.samples import SurfaceSamples
 
@@ -168,9 +169,20 @@ def test_a_suggestion_and_its_table_cost_no_more_than_so_many_grids_and_points(
     assert "no length passes of those tried" in capsys.readouterr().out
     assert sum(max(1.0, (usual / length) ** 2) for length in made) <= MOST_TRIED + TRIED_AROUND
     made = counted_runs(monkeypatch, lambda length: False)
-    monkeypatch.setattr("scantruss.report.advice.MOST_LOOKED_AT", 1)
+    monkeypatch.setattr("scantruss.report.advice.POINTS_LOOKED_AT", 1)
     Advice(cloud_of("limpet"), st.Settings(length=1.0)).suggest()
     assert 1 <= len(made) <= LEAST_TRIED
+
+
+def test_of_lengths_that_pass_one_is_suggested_that_is_followed_by_another() -> None:
+    advice = Advice(cloud_of("limpet"), st.Settings(length=1.0))
+    usual, passed = advice._usual, cast(Any, SimpleNamespace(certificate=None))
+    shorter = round_length(usual / 1.3, "nearest")
+    advice._left = 0.0  # nothing else is tried
+    advice._found = {usual: LengthTrial(usual, passed)}
+    assert advice.suggest() == usual
+    advice._found[shorter] = LengthTrial(shorter, passed)
+    assert advice.suggest() == shorter
 
 
 def test_a_length_that_is_tried_again_goes_on_where_it_paused(monkeypatch: pytest.MonkeyPatch) -> None:

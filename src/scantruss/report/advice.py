@@ -28,11 +28,17 @@ if TYPE_CHECKING:
     from ..settings import Settings
 
 A_FEW, SOME_MORE = 3, 8  # grids that are made of a length before others are tried, and when it is tried again
-#: lengths to try in turn, as multiples of the usual one, with how many grids are made of each
-LADDER_OF_LENGTHS = (
-    (1.0, A_FEW), (1.4, A_FEW), (2.0, A_FEW), (1.0, SOME_MORE), (1 / 1.4, A_FEW), (1.4, SOME_MORE), (2.8, A_FEW),
-    (2.0, SOME_MORE), (0.5, A_FEW), (2.8, SOME_MORE),
+#: lengths to try in turn after the usual one, as multiples of it, with how many grids are made of each
+LONGER_FIRST = (
+    (1.4, A_FEW), (2.0, A_FEW), (1.0, SOME_MORE), (1 / 1.4, A_FEW), (1.4, SOME_MORE), (2.8, A_FEW), (2.0, SOME_MORE),
+    (0.5, A_FEW), (2.8, SOME_MORE),
 )  # fmt: skip
+#: the same where the usual one passes, or leaves out much: members are too long for thin parts rather than too short
+SHORTER_FIRST = (
+    (1 / 1.4, A_FEW), (1.4, A_FEW), (0.5, A_FEW), (1.0, SOME_MORE), (2.0, A_FEW), (1 / 1.4, SOME_MORE), (1.4, SOME_MORE),
+    (2.8, A_FEW), (2.0, SOME_MORE),
+)  # fmt: skip
+NEARLY_NEXT = 1.45  # ratio of lengths that pass up to which the longer one stands for the next to the shorter
 NEXT_LENGTH = 1.4  # a length is suggested if that many times it passes too
 NEARBY_LENGTHS = (
     1.12,
@@ -51,7 +57,7 @@ NEARBY_LENGTHS = (
 SURE_PER_SPACING = 8.0
 MOST_LOST = 0.01  # share of the scan that may be lost at a length that is suggested
 MOST_TRIED = 20.0  # grids that are made for a suggestion, or to find a length nearby, each counted by its cost
-MOST_LOOKED_AT = 2_000_000  # points that are looked at for that
+POINTS_LOOKED_AT = 2_000_000  # points that are looked at for that
 LEAST_TRIED = 5.0  # grids that are made for that even where the scan has more points
 TRIED_AROUND = 6.0  # grids that are made besides for the lengths of the table, one each
 TRIED_USUAL = 4.0  # grids that are made at the usual length where no length nearby passes and it is far away
@@ -74,6 +80,12 @@ class LengthTrial:
     def passed(self) -> bool:
         """Whether there is a grid, and it passes."""
         return self.grid is not None
+
+    @property
+    def leaves_out(self) -> bool:
+        """Whether the first grid fails as it leaves out too much of the scan."""
+        found = getattr(getattr(self.fault, "grid", None), "certificate", None)
+        return found is not None and any(fault.kind == "cover" for fault in found.faults)
 
     @property
     def lost(self) -> float:
@@ -108,7 +120,7 @@ class Advice:
         """Allow so many grids from now on, or fewer where the scan is large; a shorter length costs more than one that counts once."""
         self._counted_at = length
         cost = len(self._cloud.points) + POINTS_PER_MEMBER * self.members(length)
-        self._left = min(most, max(LEAST_TRIED, MOST_LOOKED_AT / cost))
+        self._left = min(most, max(LEAST_TRIED, POINTS_LOOKED_AT / cost))
 
     def try_length(self, length: float, most: int = SOME_MORE) -> LengthTrial | None:
         """Return what comes of a length; None where that was not tried: it is out of range, takes too many members, or enough was tried.
@@ -167,13 +179,14 @@ class Advice:
     def suggest(self) -> float:
         """Return the length to take.
 
-        It is the first of a ladder that passes with what is next above it, both without much of the scan lost; else of those that
-        pass with what is next above them the one that loses least; else one that passes; else the usual length.
+        It is the first of those tried in turn that passes with what is next above it, both without much of the scan lost; else of
+        those that pass with what is next above them the one that loses least; else one that passes, if there is one with another
+        not far above it that passes too; else the usual length.
         """
         self.is_spent = True
         low, high = length_range(self._cloud)
         both: dict[float, float] = {}  # length -> what is lost there or at the next above
-        for share, most in LADDER_OF_LENGTHS:
+        for share, most in self._ladder():
             length = min(max(_two_digits(share * self._usual), low), high)
             trial = self.try_length(length, most)
             if trial is None or not trial.passed:
@@ -185,9 +198,15 @@ class Advice:
                     return length
         if both:
             return min(both, key=lambda length: both[length])
-        return min(
-            (trial.length for trial in self.tried if trial.passed), key=self._far_from_usual, default=self._usual
-        )
+        passing = [trial.length for trial in self.tried if trial.passed]
+        followed = [one for one in passing if any(one < other <= NEARLY_NEXT * one for other in passing)]
+        return min(followed or passing, key=self._far_from_usual, default=self._usual)
+
+    def _ladder(self) -> Iterator[tuple[float, int]]:
+        """Yield the lengths to try in turn, as multiples of the usual one, with how many grids are made of each."""
+        yield 1.0, A_FEW
+        usual = self._found.get(min(self._found, key=self._far_from_usual)) if self._found else None
+        yield from SHORTER_FIRST if usual is not None and (usual.passed or usual.leaves_out) else LONGER_FIRST
 
     def _far_from_usual(self, length: float) -> float:
         """Return how far a length is from the usual one."""
