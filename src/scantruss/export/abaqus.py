@@ -24,8 +24,8 @@ if TYPE_CHECKING:
     from ..structure.truss import LoadCase, Truss
 
 PER_LINE = 16  #: numbers in a line of a set
-WIDEST = 20  #: letters of a number, as CalculiX reads them
-ROUND = 1e-3  #: share by which the torsional inertia of a section may differ from Iy + Iz in CalculiX
+NUMBER_WIDTH = 20  #: letters of a number, as CalculiX reads them
+ROUND_TUBE = 1e-3  #: share by which the torsional inertia of a section may differ from Iy + Iz in CalculiX
 ISOTROPIC = 0.49  #: greatest Poisson's ratio that is written
 NO_SHEAR = 1e5  #: shear factor at which a beam of CalculiX is one without deformation by shear
 
@@ -56,7 +56,7 @@ def _check_calculix(truss: Truss) -> None:
             f"beams of CalculiX are isotropic, and {truss.material.name} is not; use --joints pinned or another format"
         )
     for own in truss.sections:
-        if abs(own.torsion / (own.inertia_y + own.inertia_z) - 1) > ROUND:
+        if abs(own.torsion / (own.inertia_y + own.inertia_z) - 1) > ROUND_TUBE:
             raise FormatError(
                 f"beams of CalculiX have the torsional inertia Iy + Iz, as round tubes, and {own.name} has not; use another format"
             )
@@ -64,7 +64,7 @@ def _check_calculix(truss: Truss) -> None:
 
 def _short(values: np.ndarray) -> list[str]:
     """Return numbers as text, to the last bit where that is short enough, else to 13 digits."""
-    return [word if len(word := repr(value)) <= WIDEST else f"{value:.13g}" for value in values.tolist()]
+    return [word if len(word := repr(value)) <= NUMBER_WIDTH else f"{value:.13g}" for value in values.tolist()]
 
 
 def _number(value: float) -> str:
