@@ -6,8 +6,10 @@ import json
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
+from shutil import which
 from typing import Any
 
 import meshio
@@ -17,6 +19,7 @@ from small_grids import dome
 from test_convert import UTM, roof
 
 import scantruss as st
+from scantruss.export.style import FileStyle
 from scantruss.structure.catalogue import Material, Section
 from scantruss.structure.truss import GRAVITY, LoadCase
 
@@ -270,7 +273,7 @@ def truss_of_inp(path: Path, material: Material) -> st.Truss:
         elif name == "STEP":
             last = loads[options["NAME"]] = {"nodal": np.zeros((len(nodes), 6)), "line": np.zeros((len(members), 3)),
                                              "settlement": np.full((len(nodes), 3), np.nan)}  # fmt: skip
-            assert "PERTURBATION" in options
+            assert "PERTURBATION" not in options  # CalculiX would add the stress of the case before
         elif name == "BOUNDARY":
             for node, way, _, *value in rows:
                 if value:
@@ -301,6 +304,62 @@ def test_a_reader_of_the_keywords_of_abaqus_finds_the_same_structure(others: dic
     for one, other in zip(st.solve(truss).cases, st.solve(back).cases, strict=True):
         assert one.name.replace("=", " ") == other.name
         np.testing.assert_allclose(other.displacements, one.displacements, atol=1e-6 * np.abs(one.displacements).max())
+
+
+@pytest.mark.skipif(which("ccx") is None, reason="CalculiX (Debian's calculix-ccx) is not installed")
+@pytest.mark.parametrize("others", [{"section": "CHS76.1x4"}, {"joints": "pinned", "support_type": "springs:5MN/m"}])
+def test_calculix_finds_the_same_displacements(others: dict[str, Any], tmp_path: Path) -> None:
+    truss = roof(4, **others)
+    rng = np.random.default_rng(1)
+    count, held = len(truss.nodes), np.flatnonzero(truss.supports.any(axis=1))
+    nodal, settled = 1e3 * rng.normal(size=(count, 6)), np.full((count, 3), np.nan)
+    odd = LoadCase("Träger =1 中", nodal=nodal, line=1e3 * rng.normal(size=(len(truss.members), 3)),
+                   strain=rng.normal(size=len(truss.members)) * 1e-4)  # fmt: skip
+    if truss.pinned:
+        nodal[:, 3:], settled[held[2], 2] = 0.0, -0.005
+        supports = truss.supports.copy()
+        supports[held[2], :3] = np.inf
+        truss = truss.replace(supports=supports)
+        odd = replace(odd, settlement=settled)
+    else:
+        truss = truss.replace(end_stiffness=np.full_like(truss.end_stiffness, np.inf))
+    truss = truss.replace(cases=(odd, *truss.cases))
+    path = tmp_path / "dach.inp"
+    st.write(truss, path, style=FileStyle(inp="calculix"))
+    run = subprocess.run(["ccx", "dach"], cwd=tmp_path, capture_output=True, text=True, timeout=120, check=True)
+    assert "ERROR" not in run.stdout
+    rows = [
+        line.split() for line in (tmp_path / "dach.dat").read_text().splitlines() if re.match(r" +\d+ +[-\d]", line)
+    ]
+    found = np.array(rows, float).reshape(len(truss.cases), count, -1)[:, :, 1:]
+    for case, values in zip(st.solve(truss).cases, found, strict=True):
+        for part in (slice(0, 3), slice(3, 6)):
+            if values[:, part].size:
+                moved = case.displacements[:, part]
+                np.testing.assert_allclose(values[:, part], moved, atol=1e-5 * np.abs(moved).max())
+
+
+@pytest.mark.parametrize(
+    ("others", "words"),
+    [({"section": "IPE200"}, "IPE200"), ({"joints": 2e5}, "hinges or springs"),
+     ({"section": "R100x200", "material": "GL24h"}, "isotropic"), ({"settled": True}, "settle")],
+)  # fmt: skip
+def test_what_beams_of_calculix_are_not_is_refused(others: dict[str, Any], words: str, tmp_path: Path) -> None:
+    settled = others.pop("settled", False)
+    truss = roof(4, **others)
+    if settled:
+        truss = truss.replace(cases=(LoadCase("moved", settlement=np.zeros((len(truss.nodes), 3))),))
+    with pytest.raises(st.FormatError, match=words):
+        st.write(truss, tmp_path / "a.inp", style=FileStyle(inp="calculix"))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_numbers_for_calculix_are_short_and_have_a_point(tmp_path: Path) -> None:
+    truss = example({}).replace(end_stiffness=np.full((len(example({}).members), 2, 2), np.inf))
+    st.write(truss, tmp_path / "a.inp")
+    rows = (tmp_path / "a.inp").read_text(encoding="utf-8").splitlines()
+    words = [word for row in rows if re.match(r"[-\d]", row) for word in row.split(", ")]
+    assert len(words) > 1000 and all(len(word) <= 20 for word in words)
 
 
 def test_meshio_reads_the_trusses_of_abaqus(tmp_path: Path) -> None:

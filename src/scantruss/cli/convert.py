@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 def convert_parser() -> Parser:
     """Options of ``scantruss convert``."""
-    from ..export.style import IFC_EDITIONS, IFC_VIEWS, STEP_PARTS
+    from ..export.style import IFC_EDITIONS, IFC_VIEWS, INP_PROGRAMS, STEP_PARTS
     from ..settings import UNITS
     from .options import Parser, add_outs, number
     from .schedule import tube
@@ -49,6 +49,9 @@ def convert_parser() -> Parser:
     )
     parser.add_argument("--step", metavar="|".join(STEP_PARTS), default="axes", help="what .step holds (default: axes)")
     parser.add_argument(
+        "--inp", metavar="|".join(INP_PROGRAMS), default="abaqus", help="program that .inp is for (default: abaqus)"
+    )
+    parser.add_argument(
         "--system", metavar="EPSG:CODE", help="reference system of a scan that names none, for .geojson and .ifc"
     )
     parser.add_argument("--keep-failed", action="store_true", help="also take a grid that failed its certificate")
@@ -66,7 +69,12 @@ def convert(values: Namespace) -> None:
 
     outs = [check_output(out, "") for out in outs_of(values)]
     style = FileStyle(
-        tube=values.tube, ball=values.ball, ifc=values.ifc, ifc_schema=values.ifc_schema, step=values.step
+        tube=values.tube,
+        ball=values.ball,
+        ifc=values.ifc,
+        ifc_schema=values.ifc_schema,
+        step=values.step,
+        inp=values.inp,
     )
     taken = {Path(values.source).resolve(): "file that is read"}
     claim_models(outs, taken, force=values.force)

@@ -9,6 +9,7 @@ from ..errors import InputError
 from .drawing.style import PictureStyle
 
 OBJ_ELEMENTS = ("faces", "lines", "both")
+INP_PROGRAMS = ("abaqus", "calculix")
 STEP_PARTS = ("axes", "bodies")
 IFC_EDITIONS = ("IFC4", "IFC4X3")
 PAGE_POINTS = 60_000  #: of the scan that are drawn in a page
@@ -35,6 +36,7 @@ class FileStyle(PictureStyle):
     ifc: str = "auto"  #: what an IFC file holds of a structure: physical parts, the analysis model, or (auto) both
     ifc_schema: str = "IFC4"  #: edition of IFC: IFC4, or IFC4X3 (4.3 ADD2)
     step: str = "axes"  #: what a STEP file holds: axes of the members, or bodies of members and nodes
+    inp: str = "abaqus"  #: program that an .inp file with rigid joints is for: abaqus, or calculix
     decimal_comma: bool = False  #: CSV with a decimal comma and semicolons between the columns
 
     def __post_init__(self) -> None:
@@ -48,6 +50,8 @@ class FileStyle(PictureStyle):
             raise InputError(f"the edition of IFC is {' or '.join(IFC_EDITIONS)}, got {self.ifc_schema!r}")
         if self.step not in STEP_PARTS:
             raise InputError(f"a STEP file holds {' or '.join(STEP_PARTS)}, got {self.step!r}")
+        if self.inp not in INP_PROGRAMS:
+            raise InputError(f"an .inp file is for {' or '.join(INP_PROGRAMS)}, got {self.inp!r}")
         if self.tube is not None and (self.tube[1] is None or not 0 < 2 * self.tube[1] < self.tube[0]):
             raise InputError("a tube has a diameter and a wall of less than half of it in mm, such as 60x3")
         if self.ball is not None and not 0 <= self.ball < math.inf:
