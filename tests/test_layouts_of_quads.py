@@ -20,8 +20,8 @@ def vault(count: int = 8, uneven: float = 0.0) -> st.Grid:
     """Quads of about 2 m over a square, shallowly vaulted both ways."""
     x, y = np.meshgrid(np.arange(count + 1.0), np.arange(count + 1.0), indexing="ij")
     plan = 2.0 * np.stack([x.ravel(), y.ravel()], axis=1)
-    inner = ((plan > 0) & (plan < 2.0 * count)).all(axis=1)
-    plan += uneven * inner[:, None] * np.random.default_rng(3).standard_normal(plan.shape)
+    inner = (np.abs(plan - count) < count).all(axis=1)
+    plan += uneven * np.expand_dims(inner, 1) * np.random.default_rng(3).standard_normal(plan.shape)
     away = plan - count
     nodes = np.column_stack([plan, 4.0 - 0.03 * (away**2).sum(axis=1)])
     first = np.array([(count + 1) * i + j for i in range(count) for j in range(count)])
