@@ -1,6 +1,7 @@
 """Double layers and few lengths of grids of quads and hexagons: what is under what, what holds, and the commands."""
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -19,8 +20,8 @@ def vault(count: int = 8, uneven: float = 0.0) -> st.Grid:
     """Quads of about 2 m over a square, shallowly vaulted both ways."""
     x, y = np.meshgrid(np.arange(count + 1.0), np.arange(count + 1.0), indexing="ij")
     plan = 2.0 * np.stack([x.ravel(), y.ravel()], axis=1)
-    inner = ((plan > 0) & (plan < 2.0 * count)).all(axis=1)
-    plan += uneven * inner[:, None] * np.random.default_rng(3).standard_normal(plan.shape)
+    inner = (np.abs(plan - count) < count).all(axis=1)
+    plan += uneven * np.expand_dims(inner, 1) * np.random.default_rng(3).standard_normal(plan.shape)
     away = plan - count
     nodes = np.column_stack([plan, 4.0 - 0.03 * (away**2).sum(axis=1)])
     first = np.array([(count + 1) * i + j for i in range(count) for j in range(count)])
@@ -43,7 +44,8 @@ def honeycomb(rows: int = 5) -> st.Grid:
     """Flat hexagons of members of 1 m."""
     turns = np.radians(60.0 * np.arange(6) + 30.0)
     places: dict[tuple[int, int], int] = {}
-    nodes, loops = [], []
+    nodes: list[list[float]] = []
+    loops = []
     for row in range(rows):
         for column in range(rows):
             middle = np.array([3**0.5 * (column + 0.5 * (row % 2)), 1.5 * row])
@@ -60,7 +62,7 @@ def honeycomb(rows: int = 5) -> st.Grid:
 
 @pytest.mark.parametrize("make", [vault, honeycomb])
 @pytest.mark.parametrize("second", ["dual", "same"])
-def test_counts_and_depth(make, second: str) -> None:
+def test_counts_and_depth(make: Callable[[], st.Grid], second: str) -> None:
     grid = make()
     made = st.double_layer(grid, 0.6, second=second)
     nodes, edges, panels = len(grid.nodes), len(grid.edges), len(grid.panel_table)
@@ -100,7 +102,9 @@ def test_quads_held_at_their_boundary_are_no_mechanism_and_their_layers_are_seen
     assert (layered.edge_uses[len(grid.edges) :] == 0).all()
 
 
-def test_a_layered_structure_of_quads_goes_to_files_schedules_and_back(tmp_path: Path, monkeypatch) -> None:
+def test_a_layered_structure_of_quads_goes_to_files_schedules_and_back(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(tmp_path)
     Path("vault.json").write_bytes(encode_json(vault(4)))
     words = "structure vault.json roof.json roof.obj --supports boundary --loads self --double-layer 0.8m"
@@ -120,6 +124,7 @@ def test_uneven_quads_come_to_fewer_lengths_on_their_surface() -> None:
     before, after = (len(lengths_needed(each.lengths, 0.01 * mean, 0.95)) for each in (grid, found.grid))
     assert after <= 6 < before
     made = found.grid
+    assert made.panels is not None and grid.panels is not None
     assert np.array_equal(made.panels, grid.panels) and len(made.triangles) == 2 * len(made.panels)
     assert np.array_equal(made.triangles, triangles_of(made.nodes, made.panels))
     surface = 4.0 - 0.03 * ((made.nodes[:, :2] - 8.0) ** 2).sum(axis=1)
@@ -129,7 +134,7 @@ def test_uneven_quads_come_to_fewer_lengths_on_their_surface() -> None:
     assert np.minimum(np.abs(sides), np.abs(sides - 16.0)).min(axis=1).max() < 1e-6
 
 
-def test_the_command_takes_quads(tmp_path: Path, monkeypatch) -> None:
+def test_the_command_takes_quads(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("vault.json").write_bytes(encode_json(vault(6, uneven=0.12)))
     words = "families vault.json few.json --count 5 --report few-report.json --keep-failed"

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 import numpy as np
 
 from ..grid.grid import Grid
 from ..grid.panels import triangles_of
 from ..improve.working_mesh import WorkingMesh
-from ..kernels.cells.quads import energy_of_quads, settle_quads, try_quads
+from ..kernels.cells.quads import energy_of_quads, settle_quads
+from ..kernels.cells.trial import QuadNet, try_quads
 from ..kernels.mesh.grid import INTERIOR, ON_CURVE
 from ..kernels.surface.local_surface import CENTRE, NEAREST_SAMPLE, fit_patch
 from .fine_mesh import ALONG, AT_REST_THERE, FREE
@@ -15,6 +18,8 @@ from .fine_mesh import ALONG, AT_REST_THERE, FREE
 QUAD_LENGTHS, QUAD_ANGLES = 3.0, 0.5  # weights of lengths and of angles in the energy
 QUAD_RELAXATION = 1.5  # over-relaxation
 GAIN_AT_REST = 2e-5  # gain of energy a node in a sweep below which nodes have settled
+QUADS_AT_NODE = 12  # quads at a node for which there is room at first
+NODES_AROUND = 400  # most nodes around a move that is tried
 
 
 class QuadMesh:
@@ -37,7 +42,15 @@ class QuadMesh:
         for q, corners in enumerate(self.quads):
             for v in corners:
                 self.at[v].add(q)
-        self.degree = np.array([len(each) for each in self.at], np.int64)
+        rows = _room(quads, len(quads) + room - count)
+        rows[len(quads) :] = -1
+        width = max(QUADS_AT_NODE, max(map(len, self.at)) + 4)
+        self.net = QuadNet(
+            self.nodes, rows, np.full((room, width), -1), np.zeros(room, np.int64), self.held, self.curve, self.arc,
+            self.patches, self.curves, self.desired, np.zeros(room + len(rows), np.int64), np.zeros(1, np.int64),
+        )  # fmt: skip
+        self._enter(range(count))
+        self.around = np.empty(NODES_AROUND, np.int64), np.empty((NODES_AROUND, 4))
         self.chains = {tuple(sorted(pair)) for pair in chains.tolist()}
 
     def live(self) -> np.ndarray:
@@ -94,22 +107,52 @@ class QuadMesh:
         """Return the energy of each quad (Q,)."""
         out = np.zeros(len(quads))
         share = self.shares(quads) if share is None else share
-        energy_of_quads(self.nodes, quads, share, self.patches, self.desired, lengths, angles, out)
+        energy_of_quads(
+            self.nodes, quads, share, self.held, self.curve, self.arc, self.patches, self.curves, self.desired,
+            lengths, angles, out,
+        )  # fmt: skip
         return out
 
+    def _enter(self, nodes: Iterable[int]) -> None:
+        """Enter the quads at some nodes into the net."""
+        net = self.net
+        for v in nodes:
+            own = sorted(self.at[v])
+            if len(own) > net.at.shape[1]:
+                more = np.full((len(net.at), len(own) + QUADS_AT_NODE), -1)
+                more[:, : net.at.shape[1]] = net.at
+                self.net = net = net._replace(at=more)
+            net.degree[v] = len(own)
+            net.at[v, : len(own)] = own
+
     def try_quads(
-        self, before: list[list[int]], after: list[list[int]], at_boundary: np.ndarray, sweeps: int, join: int = -1, joined: int = -1
-    ) -> float:  # fmt: skip
-        """Return by how much the energy grows where some quads replace others; the nodes around stay where they have settled."""
-        grown: float = try_quads(
-            self.nodes, np.array(before), np.array(after), self.degree, at_boundary, self.held, self.curve, self.arc, self.patches,
-            self.curves, self.desired, QUAD_LENGTHS, QUAD_ANGLES, sweeps, QUAD_RELAXATION, GAIN_AT_REST, join, joined,
+        self, touched: list[int], new: dict[int, list[int]], at_boundary: np.ndarray, allowed: float, pair: tuple[int, int]
+    ) -> tuple[float, int]:  # fmt: skip
+        """Return by how much the energy grows where some quads have other corners, and how many nodes around may have moved.
+
+        These are the first of `around`, with their places before; they are back there unless the growth is less than `allowed`.
+        """
+        numbers = [q if q >= 0 else len(self.quads) for q in new]
+        corners = [ring or [-1, -1, -1, -1] for ring in new.values()]
+        self._make_room(max(numbers) + 1)
+        grown: tuple[float, int] = try_quads(
+            self.net, np.array(touched), np.array(numbers), np.array(corners), at_boundary, QUAD_LENGTHS, QUAD_ANGLES,
+            QUAD_RELAXATION, GAIN_AT_REST, *pair, allowed, *self.around,
         )  # fmt: skip
         return grown
 
+    def _make_room(self, quads: int) -> None:
+        """Make room in the net for so many quads."""
+        net = self.net
+        if quads > len(net.quads):
+            more = _room(net.quads, 2 * quads)
+            more[len(net.quads) :] = -1
+            self.net = net._replace(quads=more, stamp=_room(net.stamp, len(net.nodes) + 2 * quads))
+
     def change(self, new: dict[int, list[int]]) -> tuple[dict[int, list[int]], list[int]]:
         """Give some quads other corners, none where one goes, key -1 for a new one; returns those before and the new quads."""
-        old, fresh = {}, []
+        self._make_room(len(self.quads) + 1)
+        old, fresh, changed = {}, [], set()
         for q, corners in new.items():
             number = q
             if q < 0:
@@ -119,19 +162,21 @@ class QuadMesh:
             old[number] = self.quads[number]
             for v in self.quads[number]:
                 self.at[v].discard(number)
-                self.degree[v] -= 1
+                changed.add(v)
             self.quads[number] = corners
         for number in old:
+            self.net.quads[number] = self.quads[number] or -1
             for v in self.quads[number]:
                 self.at[v].add(number)
-                self.degree[v] += 1
+                changed.add(v)
+        self._enter(changed)
         return old, fresh
 
-    def add_node(self, beside: int, fresh: int) -> None:
-        """Put a new node near another, on the way to the others of its quads."""
+    def add_node(self, beside: int, fresh: int, new: dict[int, list[int]]) -> None:
+        """Put a new node near another, on the way to the others of its quads, which are among the corners that change."""
         self.patches[fresh], self.desired[fresh] = self.patches[beside], self.desired[beside]
         self.held[fresh], self.fixed[fresh] = FREE, False
-        others = [w for q in sorted(self.at[fresh]) for w in self.quads[q] if w not in (fresh, beside)]
+        others = [w for ring in new.values() if fresh in ring for w in ring if w not in (fresh, beside)]
         self.nodes[fresh] = 0.6 * self.nodes[beside] + 0.4 * self.nodes[others].mean(axis=0)
 
     def renew(self, near: float) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
@@ -10,12 +10,9 @@ import numpy as np
 from .quad_mesh import QuadMesh
 from .quad_moves import NO_PAIR, Move, Moves
 
-RINGS_SETTLED = 2  # rings of quads around a move whose nodes settle in a trial
-TRIAL_SWEEPS = 8  # most sweeps of a trial
 BARRIER = 0.6  # most energy that the first of two moves may cost
 LEAST_GAIN = 1e-3  # least energy that a move must gain
 MOST_PRICE = 0.25  # largest energy that an average quad is assumed to have
-ROUNDS_OF_EFFORT = {"quick": 2, "normal": 6, "best": 12}  # most rounds of the search
 RENEWED_IN_SEARCH = (
     0.4  # distance of a node from the centre of its patch that gets it a new one after a round [members]
 )
@@ -29,8 +26,7 @@ class Made(NamedTuple):
     quads: dict[int, list[int]]  #: corners before, of quads that were there
     fresh: list[int]  #: quads that were not
     places: np.ndarray  #: (K,) nodes that may have moved
-    nodes: np.ndarray  #: (K, 3) where they were
-    arc: np.ndarray  #: (K,) the same on their curves
+    was: np.ndarray  #: (K, 4) where they were: place and arc length on their curves
     growth: float  #: of the energy
 
 
@@ -41,36 +37,30 @@ class Search:
         self.mesh, self.moves = mesh, Moves(mesh)
         self.price = price  # energy of a quad more or less
         self.twice = twice  # whether moves that cost energy are followed by another
-        self.kept = self.clock = 0
+        self.clock = 0
         self.stamp = [0] * len(mesh.at)  # when each node was last changed
         self.done: dict[tuple[int | str, ...], int] = {}  # when each move was last tried
 
     def make(self, move: Move, allowed: float) -> Made | None:
-        """Make a move and settle around it; take it back and return None unless the energy grows by less than allowed."""
+        """Make a move and settle around it; None unless the energy grows by less than allowed."""
         mesh = self.mesh
         kept, other = move.pair
-        inner = {v for v in move.touched if mesh.at[v]}
-        for _ in range(RINGS_SETTLED - 1):
-            inner |= {v for u in inner for q in mesh.at[u] for v in mesh.quads[q]}
-        ids = sorted({q for v in inner for q in mesh.at[v]})
-        before = [mesh.quads[q] for q in ids]
-        places = np.array(sorted({v for corners in before for v in corners}), np.int64)
-        old_nodes, old_arc = mesh.nodes[places], mesh.arc[places]
+        if move.kind == "split":
+            mesh.add_node(kept, other, move.quads)
+            self.moves.at_boundary[other], self.moves.ideals[other] = False, 4
+        join = move.pair if move.kind == "collapse" else NO_PAIR
+        touched = sorted(v for v in move.touched if mesh.at[v])
+        price = move.growth * self.price
+        growth, count = mesh.try_quads(touched, move.quads, self.moves.at_boundary, allowed + price, join)
+        if growth - price >= allowed:
+            return None
+        places, was = mesh.around[0][:count].copy(), mesh.around[1][:count].copy()
         old, fresh = mesh.change(move.quads)
         if move.kind == "split":
             mesh.free.pop()
-            mesh.add_node(kept, other)
-            self.moves.at_boundary[other], self.moves.ideals[other] = False, 4
-        after = [mesh.quads[q] for q in [*ids, *fresh] if mesh.quads[q]]
-        join = move.pair if move.kind == "collapse" else NO_PAIR
-        growth = mesh.try_quads(before, after, self.moves.at_boundary, TRIAL_SWEEPS, *join) - move.growth * self.price
-        if move.kind == "collapse":
+        elif move.kind == "collapse":
             mesh.free.append(other)
-        made = Made(move, old, fresh, places, old_nodes, old_arc, growth)
-        if growth < allowed:
-            return made
-        self.take_back(made)
-        return None
+        return Made(move, old, fresh, places, was, growth - price)
 
     def take_back(self, made: Made) -> None:
         """Take the last move back."""
@@ -81,11 +71,10 @@ class Search:
             mesh.free.append(made.move.pair[1])
         elif made.move.kind == "collapse":
             mesh.free.pop()
-        mesh.nodes[made.places], mesh.arc[made.places] = made.nodes, made.arc
+        mesh.nodes[made.places], mesh.arc[made.places] = made.was[:, :3], made.was[:, 3]
 
     def keep(self, *made: Made) -> None:
         """Note that moves are kept: what was tried around them may be tried again."""
-        self.kept += 1
         self.clock += 1
         for each in made:
             for v in (*each.places.tolist(), *each.move.touched):
@@ -117,8 +106,8 @@ class Search:
         self.done[key] = self.clock
         return True
 
-    def run(self) -> int:
-        """Try all moves at irregular nodes once; returns how many were kept."""
+    def run(self) -> None:
+        """Try all moves at irregular nodes once."""
         mesh, moves = self.mesh, self.moves
         for v in [v for v in range(len(mesh.at)) if mesh.at[v] and moves.charge(v)]:
             for q in sorted(mesh.at[v]):
@@ -134,17 +123,15 @@ class Search:
             for w in (v, *moves.ring_of(v)):
                 if mesh.at[w] and self.untried(("split", w), (w,)):
                     any(self.try_move(move) for move in moves.splits(w))
-        return self.kept
 
 
-def search_quads(mesh: QuadMesh, effort: str, report: Callable[[float], None]) -> None:
-    """Search until no move is kept, in rounds, and settle after each."""
-    rounds = ROUNDS_OF_EFFORT[effort]
-    for number in range(rounds):
-        report(number / rounds)
-        price = float(min(mesh.energies(mesh.live()).mean(), MOST_PRICE))
-        kept = Search(mesh, price, twice=number > 0 and effort != "quick").run()
-        mesh.renew(RENEWED_IN_SEARCH)
-        mesh.settle(SWEEPS_AFTER_ROUND)
-        if kept == 0:
-            break
+def search_once(mesh: QuadMesh, *, twice: bool) -> float:
+    """Try the moves at all irregular nodes once and settle; returns the mean energy of a quad.
+
+    twice : whether moves that cost energy are followed by another
+    """
+    price = float(min(mesh.energies(mesh.live()).mean(), MOST_PRICE))
+    Search(mesh, price, twice).run()
+    mesh.renew(RENEWED_IN_SEARCH)
+    mesh.settle(SWEEPS_AFTER_ROUND)
+    return float(mesh.energies(mesh.live()).mean())

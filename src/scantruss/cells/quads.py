@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from ..grid.grid import Grid
 from ..grid.panels import triangles_of
+from ..grid.quality import GridQuality
 from ..improve.optimize import project_onto_scan
 from ..improve.sliding_nodes import with_boundary_members, with_line_sets
 from ..improve.working_mesh import WorkingMesh
@@ -19,7 +20,7 @@ from .fine_mesh import FineMesh, fine_mesh
 from .lead import Panels
 from .pairing import pairs_of
 from .quad_mesh import QuadMesh
-from .quad_search import search_quads
+from .quad_search import search_once
 from .rows import Guide, RowStart, find_rows, lattice_places, offsets_of_edges, principal_directions, spread_rows
 from .stops import at_stops
 
@@ -30,14 +31,21 @@ if TYPE_CHECKING:
     from ..surface.samples import SurfaceSamples
 
 ROW_STARTS = (
-    RowStart(0.7, 4.0),
-    RowStart(3.0, 0.5),
-    RowStart(0.7, 1.0),
     RowStart(3.0, 6.0),
-    RowStart(0.3, 0.3),
     RowStart(1.5, 2.0),
+    RowStart(0.7, 1.0),
+    RowStart(3.0, 0.5),
+    RowStart(0.7, 4.0),
+    RowStart(0.3, 0.3),
+    RowStart(6.0, 3.0),
+    RowStart(1.5, 8.0),
+    RowStart(3.0, 2.0),
+    RowStart(0.3, 2.0),
 )
-STARTS_TRIED = {"quick": 1, "normal": 2, "best": 6}  # of them, for each effort
+STARTS_TRIED = {"quick": 1, "normal": 4, "best": 10}  # of them, for each effort
+LEFT_AFTER_ROUND = {"quick": (1,), "normal": (2, 1), "best": (5, 2)}  # starts that are searched on after each round
+MOST_ROUNDS = {"quick": 2, "normal": 6, "best": 12}  # of the search
+LEAST_FALL = 0.005  # share of the energy that a round must gain for another to follow
 PARTS = 3  # pieces that a member of the triangles becomes in the fine mesh
 FIRST_SWEEPS, LAST_SWEEPS_OF_QUADS = 60, 60  # most sweeps before the search and in the end
 FIRST_NEAR, LAST_NEAR = 0.4, 0.2  # distance of a node from the centre of its patch that gets it a new one [members]
@@ -83,16 +91,11 @@ def quads_of(
     guide = principal_directions(mesh, len(coarse.nodes)) if settings.rows == "curvature" else None
     starts, tried = ROW_STARTS[: STARTS_TRIED[settings.effort]], []
     for number, start in enumerate(starts):
-
-        def report_part(part: float, number: int = number) -> None:
-            report(0.9 * (number + part) / len(starts))
-
-        report_part(0.0)
+        report(0.6 * number / len(starts))
         first, work = _laid(grid, coarse, fine, start, guide, opened)
         before = work.grid(first).quality
-        search_quads(work, settings.effort, report_part)
-        tried.append((float(work.energies(work.live()).mean()), number, first, work, before))
-    _, _, first, work, before = min(tried, key=lambda each: each[:2])
+        tried.append(_Tried(search_once(work, twice=False), number, first, work, before))
+    _, _, first, work, before = _best_of(tried, settings.effort, report)
     work.renew(LAST_NEAR)
     work.settle(LAST_SWEEPS_OF_QUADS)
     last = work.grid(first)
@@ -107,6 +110,30 @@ def quads_of(
     made = with_boundary_members(made, constraints.lines, settings.length)
     report(1.0)
     return with_line_sets(made, constraints.lines, settings.length).replace(before=before)
+
+
+class _Tried(NamedTuple):
+    """A start and what has become of it."""
+
+    energy: float  #: mean of the quads
+    number: int
+    first: Grid  #: before the search
+    work: QuadMesh
+    before: GridQuality
+
+
+def _best_of(tried: list[_Tried], effort: str, report: Callable[[float], None]) -> _Tried:
+    """Return the best of some starts that have been searched once: fewer of them are searched on after each round."""
+    left, fallen = LEFT_AFTER_ROUND[effort], True
+    for number in range(1, MOST_ROUNDS[effort]):
+        report(0.6 + 0.3 * number / MOST_ROUNDS[effort])
+        tried = sorted(tried, key=lambda each: each[:2])[: left[min(number, len(left)) - 1]]
+        if not fallen:
+            break
+        last = tried[0].energy
+        tried = [each._replace(energy=search_once(each.work, twice=effort != "quick")) for each in tried]
+        fallen = min(tried, key=lambda each: each[:2]).energy < (1.0 - LEAST_FALL) * last
+    return min(tried, key=lambda each: each[:2])
 
 
 def _laid(

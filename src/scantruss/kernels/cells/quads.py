@@ -1,7 +1,8 @@
 """Quads are made even: their nodes move on the scan, downhill on an energy of lengths and right angles.
 
 The energy is E = lengths * sum (L / l_0 - 1)^2 over the members + angles * sum cos^2 of the corners. A corner that is turned over
-costs between 1 and 2. l_0 is the mean of the desired lengths at the two nodes of a member.
+costs between 1 and 2. l_0 is the mean of the desired lengths at the two nodes of a member. Members on curves cost more where the
+curve leaves them: `SAG_WEIGHT` times the square of its largest distance over l_0, beyond `SAG_FREE`.
 """
 
 from __future__ import annotations
@@ -11,11 +12,15 @@ import math
 import numpy as np
 
 from ...runtime.jit import kernel
-from ..boundary.curves import Curves, slide
+from ..boundary.curves import Curves, at_arc, is_open, slide
 from ..geometry.vectors import Vector, cross, dot, row, subtract, vector_in
 from ..surface.local_surface import CENTRE, NORMAL, onto_patch
 
 FLAT = 4.0  # what a corner of 180 degrees costs beside the square of its cosine, by the eighth power of that
+SAG_WEIGHT = 60.0  # of the square of what a curve is farther from its member than is free
+SAG_FREE = 0.035  # distance of a curve from its member that costs nothing [members]
+SAG_SAMPLES = 7  # places on the curve at which it is measured
+SAG_STEP = 0.02  # way along the curve over which its change is found [members]
 QUAD_REACH = 0.8  # distance from the centre of its patch beyond which a node is not moved [member lengths]
 
 
@@ -95,6 +100,53 @@ def node_energy(
 
 
 @kernel
+def sag_energy(curves: Curves, curve: int, arc: float, place: Vector, other: Vector, target: float) -> float:
+    """What a member costs because its curve leaves it; nothing where its other end is not on the same curve.
+
+    place : of the first end, at `arc` of the curve
+    """
+    there, x, y, z = slide(curves, curve, arc, 2.5 * target, other[0], other[1], other[2])
+    off = subtract((x, y, z), other)
+    if dot(off, off) > 0.01 * target * target:
+        return 0.0
+    way, total = there - arc, curves.total[curve]
+    if not is_open(curves, curve):
+        way -= total * math.floor(way / total + 0.5)
+    side = subtract(other, place)
+    square, farthest = max(dot(side, side), 1e-12 * target * target), 0.0
+    for k in range(1, SAG_SAMPLES + 1):
+        _, x, y, z = at_arc(curves, curve, arc + way * k / (SAG_SAMPLES + 1.0))
+        d = subtract((x, y, z), place)
+        t = min(max(dot(d, side) / square, 0.0), 1.0)
+        d = (d[0] - t * side[0], d[1] - t * side[1], d[2] - t * side[2])
+        farthest = max(farthest, dot(d, d))
+    excess = max(math.sqrt(farthest) / target - SAG_FREE, 0.0)
+    return SAG_WEIGHT * excess * excess
+
+
+@kernel
+def sag_around(
+    nodes: np.ndarray, quads: np.ndarray, share: np.ndarray, of: np.ndarray, begin: int, end: int, v: int, place: Vector,
+    arc: float, held: np.ndarray, curve: np.ndarray, curves: Curves, desired: np.ndarray,
+) -> float:  # fmt: skip
+    """What the members at a node cost because its curve leaves them, if it stood at an arc length; parameters as in `node_energy`."""
+    energy = 0.0
+    for i in range(begin, end):
+        q = of[i]
+        k = 0
+        for corner in range(4):
+            if quads[q, corner] == v:
+                k = corner
+        for way in (1, 3):
+            u = quads[q, (k + way) % 4]
+            if held[u] > 0:
+                weight = share[q, k] if way == 1 else share[q, (k + 3) % 4]
+                target = 0.5 * (desired[v] + desired[u])
+                energy += weight * sag_energy(curves, curve[v], arc, place, row(nodes, u), target)
+    return energy
+
+
+@kernel
 def settle_quads(
     nodes: np.ndarray,
     quads: np.ndarray,
@@ -129,7 +181,20 @@ def settle_quads(
             before, gx, gy, gz = node_energy(
                 nodes, quads, share, of, begin, end, v, place, normal, desired, lengths, angles
             )
-            if held[v] == 0:
+            if held[v] == 1:
+                by = SAG_STEP * desired[v]
+                back, x, y, z = at_arc(curves, curve[v], arc[v] - by)
+                there, u, w, t = at_arc(curves, curve[v], arc[v] + by)
+                before += sag_around(
+                    nodes, quads, share, of, begin, end, v, place, arc[v], held, curve, curves, desired
+                )
+                slope = sag_around(
+                    nodes, quads, share, of, begin, end, v, (u, w, t), there, held, curve, curves, desired
+                ) - sag_around(nodes, quads, share, of, begin, end, v, (x, y, z), back, held, curve, curves, desired)
+                run = subtract((u, w, t), (x, y, z))
+                slope /= max(dot(run, run), by * by)
+                gx, gy, gz = gx + slope * run[0], gy + slope * run[1], gz + slope * run[2]
+            else:
                 over = gx * normal[0] + gy * normal[1] + gz * normal[2]
                 gx, gy, gz = gx - over * normal[0], gy - over * normal[1], gz - over * normal[2]
             local = desired[v]
@@ -153,6 +218,8 @@ def settle_quads(
                         step *= 0.3
                         continue
                 after = node_energy(nodes, quads, share, of, begin, end, v, to, normal, desired, lengths, angles)[0]
+                if held[v] == 1:
+                    after += sag_around(nodes, quads, share, of, begin, end, v, to, new, held, curve, curves, desired)
                 if after < before:
                     nodes[v, 0], nodes[v, 1], nodes[v, 2] = to
                     arc[v] = new
@@ -169,7 +236,11 @@ def energy_of_quads(
     nodes: np.ndarray,
     quads: np.ndarray,
     share: np.ndarray,
+    held: np.ndarray,
+    curve: np.ndarray,
+    arc: np.ndarray,
     patches: np.ndarray,
+    curves: Curves,
     desired: np.ndarray,
     lengths: float,
     angles: float,
@@ -184,86 +255,14 @@ def energy_of_quads(
             place = row(nodes, v)
             s = side_energy(place, row(nodes, a), 0.5 * (desired[v] + desired[a]))[0]
             energy += lengths * share[q, k] * s
+            if held[v] > 0 and held[a] > 0 and held[v] + held[a] < 4:
+                on, other = (v, a) if held[v] == 1 else (a, v)
+                target = 0.5 * (desired[v] + desired[a])
+                energy += share[q, k] * sag_energy(
+                    curves, curve[on], arc[on], row(nodes, on), row(nodes, other), target
+                )
             e, f = subtract(row(nodes, a), place), subtract(row(nodes, b), place)
             energy += angles * corner_energy(e, f, vector_in(patches, v, NORMAL))[0]
         out[q] = energy
         total += energy
     return total
-
-
-@kernel
-def shares_of(quads: np.ndarray, at_boundary: np.ndarray, share: np.ndarray) -> None:
-    """Fill in the weight of each side of some quads (Q, 4): 1 on the boundary, 1/2 where another quad has it too or may have."""
-    count = 4 * len(quads)
-    for i in range(count):
-        q, k = i // 4, i % 4
-        a, b = quads[q, k], quads[q, (k + 1) % 4]
-        share[q, k] = 0.5
-        if at_boundary[a] and at_boundary[b]:
-            alone = True
-            for j in range(count):
-                p, m = j // 4, j % 4
-                alone = alone and not (quads[p, m] == b and quads[p, (m + 1) % 4] == a)
-            if alone:
-                share[q, k] = 1.0
-
-
-@kernel
-def try_quads(
-    nodes: np.ndarray,
-    before: np.ndarray,
-    after: np.ndarray,
-    degree: np.ndarray,
-    at_boundary: np.ndarray,
-    held: np.ndarray,
-    curve: np.ndarray,
-    arc: np.ndarray,
-    patches: np.ndarray,
-    curves: Curves,
-    desired: np.ndarray,
-    lengths: float,
-    angles: float,
-    sweeps: int,
-    stride: float,
-    enough: float,
-    join: int,
-    joined: int,
-) -> float:
-    """Return by how much the energy of some quads grows that are put in the place of others, once their inner nodes have settled.
-
-    Parameters
-    ----------
-    before, after : (Q, 4) the quads around a move, without it and with it
-    degree : (V,) quads at each node after the move; nodes all of whose quads are among them settle
-    join, joined : node that another was merged with, which starts between them; -1 for none
-    """
-    share, out = np.empty((len(before), 4)), np.empty(len(before))
-    shares_of(before, at_boundary, share)
-    old = energy_of_quads(nodes, before, share, patches, desired, lengths, angles, out)
-    if join >= 0 and held[join] == 0:
-        for k in range(3):
-            nodes[join, k] = 0.5 * (nodes[join, k] + nodes[joined, k])
-    count = len(after)
-    share, out = np.empty((count, 4)), np.empty(count)
-    shares_of(after, at_boundary, share)
-    flat = after.copy().reshape(4 * count)
-    order = np.argsort(flat, kind="mergesort")
-    some, start, of = np.empty(4 * count, np.int64), np.zeros(4 * count + 1, np.int64), np.empty(4 * count, np.int64)
-    found, taken, i = 0, 0, 0
-    while i < 4 * count:  # each turn goes on to the next node
-        v, j = flat[order[i]], i
-        while j < 4 * count and flat[order[j]] == v:  # each turn goes on by a corner
-            j += 1
-        if j - i == degree[v] and held[v] < 2:
-            for k in range(i, j):
-                of[taken] = order[k] // 4
-                taken += 1
-            some[found] = v
-            found += 1
-            start[found] = taken
-        i = j
-    settle_quads(
-        nodes, after, share, of[:taken], start[: found + 1], some[:found], held, curve, arc, patches, curves,
-        desired, lengths, angles, sweeps, stride, enough,
-    )  # fmt: skip
-    return energy_of_quads(nodes, after, share, patches, desired, lengths, angles, out) - old
