@@ -20,7 +20,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     np.savetxt(place / "dome.xyz", np.stack([x, y, 2 - 0.04 * ((x - 5) ** 2 + (y - 5) ** 2)], axis=1))
     grid = f"grid {place}/dome.xyz {place}/dome.json --length 2 --unit m --effort quick --report {place}/page.html"
     assert main(grid.split()) == 0
-    assert main(f"structure {place}/dome.json --supports boundary --report {place}/structure.html".split()) == 0
+    assert (
+        main(f"structure {place}/dome.json {place}/s.json --supports boundary --report {place}/structure.html".split())
+        == 0
+    )
     return place
 
 

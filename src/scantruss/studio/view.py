@@ -21,6 +21,7 @@ from .picking import NEAR_ENOUGH, pick
 from .scene import Scene
 from .session import Session
 from .state import StudioState
+from .style import STYLE
 from .tab_compare import CompareTab
 from .tab_constraints import ConstraintsTab
 from .tab_design import DesignTab
@@ -59,6 +60,7 @@ class StudioView:
             gui.main_panel.dock_right()
             gui.main_panel.set_width(PANEL_WIDTH)
             gui.configure_theme(show_share_button=False, show_logo=False, control_width="large")
+            gui.add_html(STYLE)
             self.message = gui.add_markdown("")
             self.progress = gui.add_progress_bar(0.0, visible=False)
             self.steps = gui.add_button_group(
