@@ -181,7 +181,8 @@ FAINT = """() => {  // what is written with less contrast than 4.5 to 1 (WCAG 2.
     return 0.2126 * f[0] + 0.7152 * f[1] + 0.0722 * f[2]; };
   const parts = (s) => { const m = s.match(/[\\d.]+/g).map(Number); return m.length > 3 ? m : [...m, 1]; };
   return [...document.querySelectorAll("body *")].filter((e) => {
-    const says = [...e.childNodes].some((n) => n.nodeType === 3 && n.textContent.trim()) || (e.tagName === "INPUT" && e.type === "text" && e.value);
+    const says = [...e.childNodes].some((n) => n.nodeType === 3 && n.textContent.trim())
+      || (e.tagName === "INPUT" && e.type === "text" && e.value);
     if (!says || !e.getClientRects().length || e.tagName === "STYLE") return false;
     let behind = [255, 255, 255, 1];
     for (let p = e; p; p = p.parentElement) { const b = parts(getComputedStyle(p).backgroundColor); if (b[3] > 0.9) { behind = b; break; } }
@@ -199,7 +200,7 @@ def test_a_person_makes_a_grid_and_a_structure(served: tuple[str, Session], tmp_
         page.wait_for_selector("text=Generate")
         page.click("text=Crop >> nth=0")
         field(page, "crop").fill("box:0,0,9,10")
-        page.click("button:text-is('Crop')")
+        page.get_by_role("button", name="Crop", exact=True).last.click()
         page.wait_for_selector("text=of 3,600 points")
         tab(page, "Design")
         page.focus("[role=slider]:visible")

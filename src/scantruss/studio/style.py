@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-STYLE = """<style>
+PANEL_STYLE = """<style>
 :root[data-mantine-color-scheme] { --mantine-color-dimmed: #545b62; --mantine-primary-color-filled: #1864ab;
   --mantine-primary-color-filled-hover: #14538f; --mantine-color-blue-filled: #1864ab; --mantine-color-blue-filled-hover: #14538f;
   --mantine-color-blue-outline: #1864ab; --mantine-color-blue-text: #1864ab; --mantine-color-placeholder: #5f666d }
@@ -10,6 +10,8 @@ STYLE = """<style>
   --mantine-color-blue-text: #8cc4f8; --mantine-color-placeholder: #a9b0b6 }
 [data-mantine-color-scheme="light"] [role="tab"][aria-selected="true"] span { color: #1864ab !important }
 [data-mantine-color-scheme="dark"] [role="tab"][aria-selected="true"] span { color: #8cc4f8 !important }
-[data-mantine-color-scheme="light"] :is(.multi-slider-mark-label, .mantine-Slider-markLabel, .mantine-Notification-description) { color: #545b62 !important }
-[data-mantine-color-scheme="dark"] :is(.multi-slider-mark-label, .mantine-Slider-markLabel, .mantine-Notification-description) { color: #b4bac0 !important }
+[data-mantine-color-scheme="light"]
+  :is(.multi-slider-mark-label, .mantine-Slider-markLabel, .mantine-Notification-description) { color: #545b62 !important }
+[data-mantine-color-scheme="dark"]
+  :is(.multi-slider-mark-label, .mantine-Slider-markLabel, .mantine-Notification-description) { color: #b4bac0 !important }
 </style>"""
