@@ -272,6 +272,10 @@ def test_a_server_that_is_killed_loses_nothing_but_what_it_was_at(tmp_path: Path
         assert process.stdout is not None and "studio at" in process.stdout.readline()
         return process
 
+    def kill(process: subprocess.Popen[str]) -> None:
+        process.kill()
+        process.communicate(timeout=30)
+
     process = begin("dome.xyz")
     try:
         with open_page(f"http://127.0.0.1:{port}/") as (page, _):
@@ -281,15 +285,13 @@ def test_a_server_that_is_killed_loses_nothing_but_what_it_was_at(tmp_path: Path
             page.click("button:has-text('Generate')")
             page.wait_for_selector("text=undo: generate")
             said = page.inner_text("p:has-text('members')").partition("\n")[0]
-            process.kill()
-            process.wait(30)
+            kill(process)
             process = begin("dome.scantruss")
             page.goto(f"http://127.0.0.1:{port}/")
             tab(page, "Design")
             page.wait_for_selector(f"text={said.strip()}")
     finally:
-        process.kill()
-        process.wait(30)
+        kill(process)
 
 
 def test_two_browsers_have_a_project_each(served: tuple[str, Session]) -> None:
