@@ -19,7 +19,7 @@ from .improve.equalize import energy_of_node
 from .improve.optimize import improve_first, improve_last
 from .improve.rings import finish_rings
 from .runtime.parallel import processors
-from .runtime.progress import Progress
+from .runtime.progress import Progress, WatchedProgress, seer_of
 from .settings import SAMPLE_SPACING
 from .surface.chosen_samples import ROD
 from .surface.samples import sample_surface
@@ -233,14 +233,18 @@ def advance_fronts(
     FrontError
         None has come to its end; the fault of the first.
     """
-    lone = progress if len(fields) == 1 else None
+    see = seer_of(progress)
+    first = progress if len(fields) == 1 or see is None else WatchedProgress(None, see)  # of several one is seen
+    lone = first if len(fields) == 1 or see is not None else None
 
     def advance(field: Field) -> Grid | FrontError:
         start, nodes = field
         own = settings if start.laid else settings.replace(length=start.scale * settings.length)
         scratch = replace(samples, surface=with_own_scratch(samples.surface))
         try:
-            return advance_front(scratch, boundary, constraints, own, nodes, progress=lone)
+            return advance_front(
+                scratch, boundary, constraints, own, nodes, progress=lone if field is fields[0] else None
+            )
         except FrontError as error:
             return error
 

@@ -19,7 +19,7 @@ from .front.orientation_field import orientation_fields
 from .grid.grid import Grid
 from .hope import Hope
 from .improve.mirrored import MIRROR_LINE, check_lines_kept, mirror_lines, mirrored_grid, sides_of
-from .runtime.progress import Progress
+from .runtime.progress import Progress, seer_of
 from .scan.cloud import PointCloud
 from .scan.member_length import check_length
 from .scan.stream.fit import read_to_fit
@@ -257,6 +257,7 @@ class Stopwatch:
 
     def __init__(self, progress: Progress | None, read_seconds: float) -> None:
         self._progress = progress
+        self.see_front = seer_of(progress)
         self._seconds = {"read": read_seconds, "boundary": 0.0, "front": 0.0, "optimize": 0.0}
         self._stage, self._since = "boundary", perf_counter()
 

@@ -38,7 +38,7 @@ from ..kernels.surface.local_surface import (
     walk,
 )
 from ..kernels.surface.ridges import mean_normal
-from ..runtime.progress import Progress
+from ..runtime.progress import Progress, seer_of
 from ..runtime.watch import Watch
 from ..settings import Settings
 from ..surface.samples import SurfaceSamples, local_field
@@ -58,6 +58,7 @@ SIDE_REACH = 0.6  # how far the sides of a ridge are looked at [member lengths]
 NODE_BOX = 2.4
 MOST_TRIANGLES_MADE = 4.0  # times as many triangles as the scan has room for that a front may make
 RUNS_OVER_ITSELF = "the front runs over itself: the scan is too rough or too sparse for this length"
+SEGMENTS_PER_LOOK = 60  # segments advanced between two looks at the front, where somebody sees it
 SEGMENTS_PER_REPORT = 500  # segments advanced between two reports of progress
 
 
@@ -322,8 +323,12 @@ def run(
     expected = samples.graded_area / (0.433 * rules.desired**2)
     watch, made = Watch(RUNS_OVER_ITSELF, expected, MOST_TRIANGLES_MADE), int(front.count[lists.TRIANGLES])
     watch.note(made, samples.origin)
+    see = seer_of(progress)
     while True:  # each slice makes triangles, or the queue becomes shorter
-        status = step(samples.surface, front, rules, SEGMENTS_PER_REPORT)
+        status = step(samples.surface, front, rules, SEGMENTS_PER_REPORT if see is None else SEGMENTS_PER_LOOK)
+        if see is not None:
+            nodes, triangles = front.count[lists.NODES], front.count[lists.TRIANGLES]
+            see(front.nodes[:nodes] + samples.origin, front.triangles[:triangles].copy())
         if progress:
             progress("front", min(float(front.count[lists.TRIANGLES]) / max(expected, 1.0), 1.0))
         if status == lists.DONE:

@@ -16,7 +16,7 @@ from ..surface.samples import sample_surface
 
 AROUND_LINE = 16  #: points of the scan to whose plane a place on a line is brought
 STEP_OF_LINE = 0.5  #: largest distance of the points of a line [member length]
-MOST_HALVINGS = 10  #: of a stretch between two points
+MOST_HALVINGS_OF_LINE = 10  #: of a stretch between two points
 
 
 class ScannedPoints:
@@ -49,7 +49,7 @@ class ScannedPoints:
         line = [points[0]]
         for begin, end in itertools.pairwise(points):
             stretch = np.stack([begin, end])
-            for _ in range(MOST_HALVINGS):
+            for _ in range(MOST_HALVINGS_OF_LINE):
                 if np.linalg.norm(np.diff(stretch, axis=0), axis=1).max() <= STEP_OF_LINE * length:
                     break
                 middles = [self.onto(middle) for middle in 0.5 * (stretch[:-1] + stretch[1:])]

@@ -14,6 +14,12 @@ if TYPE_CHECKING:
     from ..export.model import Model
     from .state import StudioState
 
+FRONT_COLOR = np.array((240, 190, 90), np.uint8)
+NOWHERE, NO_TRIANGLES = np.zeros((0, 3)), np.zeros((0, 3), np.int64)
+GRID_PARTS = (
+    "/grid/members", "/grid/members in points", "/grid/tubes", "/grid/nodes", "/grid/balls", "/grid/panels",
+    "/grid/panels coloured",
+)  # fmt: skip
 PANEL_COLOR = (205, 216, 223)
 SELECTED_COLOR = (230, 97, 1)
 LINE_WIDTH, WIDE = 3.0, 7.0  #: of members and of what stands out [pixel]
@@ -41,6 +47,7 @@ class Scene:
         scene.set_up_direction("+z")
         self.light(False)
         self._scan_key: tuple[Any, ...] = ()
+        self._draws_front = False
         self._scan_scale: tuple[str, float, float] | None = None
 
     def scan(self, state: StudioState, wanted: str, section: SectionPlane | None) -> tuple[str, float, float] | None:
@@ -184,6 +191,23 @@ class Scene:
         rgba = np.concatenate([np.repeat(colors, 3, axis=0), np.full((len(corners), 1), 255)], axis=1)
         body.visual.vertex_colors = rgba.astype(np.uint8)
         self.api.add_mesh_trimesh(f"{name} coloured", body)
+
+    def front(self, frame: SceneFrame | None, front: tuple[np.ndarray, np.ndarray] | None) -> None:
+        """Draw a front that advances, nodes (V, 3) [scan unit] and triangles (T, 3), in place of the grid; None draws the grid again."""
+        if front is None or frame is None:
+            if self._draws_front:
+                self.panels("/front", NOWHERE, NO_TRIANGLES, None, None)
+        elif len(front[1]):
+            nodes, triangles = front
+            self.panels(
+                "/front", frame.to_scene(nodes), triangles, np.broadcast_to(FRONT_COLOR, (len(triangles), 3)), None
+            )
+        shown = front is not None and frame is not None
+        if shown != self._draws_front:
+            self._draws_front = shown
+            for name in GRID_PARTS:
+                if (handle := self.api.get_handle_by_name(name)) is not None:
+                    handle.visible = not shown
 
     def highlight(self, kind: str, number: int, places: np.ndarray, model: Model) -> None:
         """Draw a node, member or panel so that it stands out."""

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from time import monotonic
 from typing import Any
+
+import numpy as np
 
 from ..errors import InputError
 from ..export.model import Model
 from ..pipeline import grid_from_cloud
-from ..runtime.progress import Progress
+from ..runtime.progress import Progress, WatchedProgress
 from ..scan.cloud import PointCloud
 from ..scan.member_length import exact_range
 from ..settings import Settings
@@ -20,9 +23,9 @@ from .outputs import command_of, files_of, model_to_show
 from .scan_steps import ScanSteps
 from .solving import check_words, solved_state
 
+SECONDS_OF_FRONT = 0.2  #: between two pictures of a front [s]
 MOST_LIVE_MEMBERS = 60_000  #: of a quick grid that is made while the length changes
 STRUCTURE_WORDS = ("supports", "support_type", "section", "material", "loads", "size_by")  #: what the page asks for
-STRUCTURE_NUMBERS = ("scale", "size", "buckling", "frequencies")  #: and the numbers
 
 
 class Session(ScanSteps):
@@ -33,6 +36,8 @@ class Session(ScanSteps):
         self.features: list[Feature] = []
         self.wants_features = False  #: whether holes and ridges are looked for after each grid
         self._features_of: tuple[PointCloud, Settings] | None = None
+        self.front: tuple[np.ndarray, np.ndarray] | None = None  #: nodes and triangles of a front that advances
+        self._front_seen = 0.0
 
     def _forget_features(self) -> None:
         self.features, self._features_of = [], None
@@ -76,7 +81,11 @@ class Session(ScanSteps):
         if live and not low <= settings.length <= high:
             return  # Generate says why
         progress("boundary", 0.0)
-        grid = grid_from_cloud(cloud, settings.replace(effort=effort), progress=progress)
+        try:
+            watched = progress if live else WatchedProgress(progress, self._see_front)
+            grid = grid_from_cloud(cloud, settings.replace(effort=effort), progress=watched)
+        finally:
+            self.front = None
         made: dict[str, Any] = {"grid": grid, "asked": settings, "is_live": live, "solution": None, "report": None}
         with self._lock:
             if turn != self._turn or (live and len(grid.edges) > MOST_LIVE_MEMBERS):
@@ -89,6 +98,12 @@ class Session(ScanSteps):
             self.save()
         self.tell()
         self._find_features(progress)
+
+    def _see_front(self, nodes: np.ndarray, triangles: np.ndarray) -> None:
+        """Show a front while it advances, a few times a second."""
+        if monotonic() - self._front_seen >= SECONDS_OF_FRONT:
+            self.front, self._front_seen = (nodes, triangles), monotonic()
+            self.tell()
 
     # ---- holes, ridges, fixed nodes
 

@@ -12,7 +12,7 @@ from ..export.page_tables import PageColumn, colorings_of
 from .certificate_list import CertificateList
 from .colours import DIMMED, colors_of, histogram_of, legend_of, values_of
 from .frame import SectionPlane
-from .scene import BALL_RADIUS, MOST_DRAWN_LINES, TUBE_RADIUS, cut, drawn_colors, plain_colors
+from .scene import BALL_RADIUS, GRID_PARTS, MOST_DRAWN_LINES, TUBE_RADIUS, cut, drawn_colors, plain_colors
 
 if TYPE_CHECKING:
     from .state import StudioState
@@ -114,15 +114,7 @@ class GridTab:
         """Draw the grid or structure."""
         scene, shown = self.view.scene, self.view.shown_model()
         if shown is None:
-            scene.remove(
-                "/grid/members",
-                "/grid/members in points",
-                "/grid/tubes",
-                "/grid/nodes",
-                "/grid/balls",
-                "/grid/panels",
-                "/grid/panels coloured",
-            )
+            scene.remove(*GRID_PARTS)
             return
         model, _ = shown
         places = self.view.places(model)

@@ -21,6 +21,7 @@ from .picking import NEAR_ENOUGH, pick
 from .scene import Scene
 from .session import Session
 from .state import StudioState
+from .style import PANEL_STYLE
 from .tab_compare import CompareTab
 from .tab_constraints import ConstraintsTab
 from .tab_design import DesignTab
@@ -37,7 +38,7 @@ NATURAL_VIEW = 0.65  #: of the camera, upright [rad]
 PLAN_VIEW = 0.08  #: the same of a plan, seen from so far that heights hardly matter [rad]
 PLAN_FAR = 1.3  #: of the camera above a plan, so that all of it is seen [distance at which it fills the view]
 PANEL_WIDTH = 452  #: [pixel]
-STEPS = ("Generate", "Stop", "Undo", "Redo")
+STEP_NAMES = ("Generate", "Stop", "Undo", "Redo")
 
 
 class StudioView:
@@ -59,11 +60,12 @@ class StudioView:
             gui.main_panel.dock_right()
             gui.main_panel.set_width(PANEL_WIDTH)
             gui.configure_theme(show_share_button=False, show_logo=False, control_width="large")
+            gui.add_html(PANEL_STYLE)
             self.message = gui.add_markdown("")
             self.progress = gui.add_progress_bar(0.0, visible=False)
             self.steps = gui.add_button_group(
                 "steps",
-                STEPS,
+                STEP_NAMES,
                 hint="Generate with the effort that Design says; what undo and redo would take is said above",
             )
             self.click = gui.add_dropdown("a click", (SELECT,), hint="what a click on the drawing does")
@@ -84,8 +86,8 @@ class StudioView:
             with tabs.add_tab("Out"):
                 self.files = OutTab(self, gui)
             self.click.options = self.clicks
+            self.steps.on_click(self.step(lambda: self._step(self.steps.value)))  # before anybody can click
         self.tabs = (self.design, self.constraints, self.structure, self.look, self.scan, self.compare, self.files)
-        self.steps.on_click(self.step(lambda: self._step(self.steps.value)))
         client.scene.on_click()(self._clicked)
         self._end = session.listen(self.update)
         self.update()
@@ -131,7 +133,7 @@ class StudioView:
 
     def _step(self, name: str) -> None:
         session = self.session
-        dict(zip(STEPS, (session.generate, session.stop, session.undo, session.redo), strict=True))[name]()
+        dict(zip(STEP_NAMES, (session.generate, session.stop, session.undo, session.redo), strict=True))[name]()
 
     # ---- clicks
 
@@ -249,6 +251,7 @@ class StudioView:
             taken = " · ".join(f"{way}: {what}" for way, what in (("undo", undo), ("redo", redo)) if what)
             self.message.content = words + (f"\n\n<small>{taken}</small>" if taken else "")
             self.progress.visible, self.progress.value = bool(session.stage), 100.0 * session.share
+            self.scene.front(None if state.cloud is None or session.front is None else self.frame, session.front)
             before, self._shown = self._shown, state
             for tab in self.tabs:
                 tab.fill(before, state)

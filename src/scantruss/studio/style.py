@@ -1,0 +1,17 @@
+"""Colours of the panel: those of viser, but dark or light enough to be read (WCAG 2.1 AA, 4.5 to 1)."""
+
+from __future__ import annotations
+
+PANEL_STYLE = """<style>
+:root[data-mantine-color-scheme] { --mantine-color-dimmed: #545b62; --mantine-primary-color-filled: #1864ab;
+  --mantine-primary-color-filled-hover: #14538f; --mantine-color-blue-filled: #1864ab; --mantine-color-blue-filled-hover: #14538f;
+  --mantine-color-blue-outline: #1864ab; --mantine-color-blue-text: #1864ab; --mantine-color-placeholder: #5f666d }
+:root[data-mantine-color-scheme="dark"] { --mantine-color-dimmed: #b4bac0; --mantine-color-blue-outline: #8cc4f8;
+  --mantine-color-blue-text: #8cc4f8; --mantine-color-placeholder: #a9b0b6 }
+[data-mantine-color-scheme="light"] [role="tab"][aria-selected="true"] span { color: #1864ab !important }
+[data-mantine-color-scheme="dark"] [role="tab"][aria-selected="true"] span { color: #8cc4f8 !important }
+[data-mantine-color-scheme="light"]
+  :is(.multi-slider-mark-label, .mantine-Slider-markLabel, .mantine-Notification-description) { color: #545b62 !important }
+[data-mantine-color-scheme="dark"]
+  :is(.multi-slider-mark-label, .mantine-Slider-markLabel, .mantine-Notification-description) { color: #b4bac0 !important }
+</style>"""
