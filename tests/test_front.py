@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as strategies
+from marks import compiled_only
 from small_clouds import HandFront, ball, cap, ring, sheet, tire, turn_of
 from steps import boundary_of, front_of, steps_of
 
@@ -250,6 +251,7 @@ def assert_sound_or_refused(points: np.ndarray, length: float, method: str) -> N
     assert np.isfinite(grid.nodes).all()
 
 
+@compiled_only
 @settings(max_examples=150)
 @given(strategies.integers(0, 1_000_000), strategies.sampled_from([0.4, 0.7, 1.2]), strategies.sampled_from(METHODS))
 def test_rubbish_leaves_no_edge_with_three_triangles_or_is_refused(seed: int, length: float, method: str) -> None:
@@ -257,7 +259,7 @@ def test_rubbish_leaves_no_edge_with_three_triangles_or_is_refused(seed: int, le
 
 
 @pytest.mark.kernels
-@settings(max_examples=6)
+@settings(max_examples=2)
 @given(strategies.integers(0, 1_000_000), strategies.sampled_from(METHODS))
 def test_rubbish_leaves_no_kernel_out_of_bounds(seed: int, method: str) -> None:
     assert_sound_or_refused(rubbish(seed), 0.7, method)

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from marks import compiled_only
 from scipy.spatial import cKDTree
 
 import scantruss as st
@@ -58,7 +59,7 @@ def test_a_scan_without_a_mirror_plane_is_refused() -> None:
         find_mirror_planes(points, 0.5)
 
 
-@pytest.mark.kernels
+@compiled_only
 @pytest.mark.parametrize("lean", [0.0, 12.0])
 def test_the_grid_is_its_own_image_to_rounding(lean: float) -> None:
     settings = st.Settings(length=LENGTH, symmetry="auto", effort="quick")
@@ -83,7 +84,6 @@ def test_the_grid_is_its_own_image_to_rounding(lean: float) -> None:
     assert np.array_equal(again.nodes, grid.nodes) and np.array_equal(again.triangles, grid.triangles)
 
 
-@pytest.mark.kernels
 def test_a_fixed_line_without_its_image_is_refused() -> None:
     line = [(512.0, -215.0, 33.0), (532.0, -185.0, 22.0)]  # aslant over the middle
     points = vault()
@@ -92,7 +92,6 @@ def test_a_fixed_line_without_its_image_is_refused() -> None:
         st.grid_from_points(points, st.Settings(length=LENGTH, symmetry="auto", fixed_lines=[line], effort="quick"))
 
 
-@pytest.mark.kernels
 def test_the_command_takes_planes_of_a_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
