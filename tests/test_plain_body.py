@@ -73,6 +73,16 @@ def test_a_thin_limb_is_taken_off_where_it_begins_and_nothing_else(radius: float
     assert (np.abs(np.linalg.norm(opened.added, axis=1) - RADIUS) < 0.5).all()
 
 
+def test_what_hung_on_a_limb_leaves_with_it() -> None:
+    """A ball at the end of a thin rod has room for the ball of the opening, but would be left behind as an island."""
+    limb, far = outside(rod(0.25, straight(3.0))), np.array([RADIUS + 3.5, 0.0, 0.0])
+    end = far + 0.25 * ball(3_000, seed=4)
+    scan = np.concatenate([ball(), limb[np.linalg.norm(limb - far, axis=1) > 1.0], end])
+    opened = opened_body(scan, LENGTH, SPACING)
+    assert opened is not None and opened.limb[np.linalg.norm(scan, axis=1) > RADIUS + 0.8].all()
+    assert (np.linalg.norm(opened.added - [RADIUS, 0.0, 0.0], axis=1) < 1.0).all()
+
+
 @pytest.mark.parametrize("radius", [0.7, 1.0])
 def test_a_limb_that_has_room_for_the_ball_stays(radius: float) -> None:
     assert radius > LIMB_RADIUS

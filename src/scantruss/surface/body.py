@@ -244,6 +244,21 @@ def _beyond_ball(voxels: Voxels, radius: float, deep: float, lattice: _Lattice) 
     return near
 
 
+def _islands(body: Voxels, before: Voxels) -> Voxels:
+    """Return the parts of a body (X, Y, Z) that hung on what was taken off it: of each part before, all but the largest that is left."""
+    from scipy import ndimage
+
+    part, count = ndimage.label(body)
+    of = ndimage.label(before)[0]
+    sizes = np.bincount(part.ravel(), minlength=count + 1)
+    whole = ndimage.maximum(of, part, np.arange(count + 1)).astype(int).tolist()  # of which each is
+    largest: dict[int, int] = {}
+    for each in (np.argsort(-sizes[1:], kind="stable") + 1).tolist():
+        largest.setdefault(whole[each], each)
+    islands: Voxels = body & ~np.isin(part, list(largest.values()))
+    return islands
+
+
 def _open_and_close(points: np.ndarray, body: Voxels, lattice: _Lattice, length: float) -> OpenedBody | None:
     """Return what becomes of points (N, 3) around a body; None where it is all thinner than a limb, loses too much or nothing changes."""
     from scipy import ndimage
@@ -254,7 +269,9 @@ def _open_and_close(points: np.ndarray, body: Voxels, lattice: _Lattice, length:
     limbs = _beyond_ball(body, LIMB_RADIUS * length, DEPTH_OF_LIMBS * length, lattice)
     body = body & ~limbs
     slits = _beyond_ball(~body, SLIT_RADIUS * length, DEPTH_OF_LIMBS * length, lattice)
-    body = body | slits
+    islands = _islands(body | slits, body | limbs)
+    limbs |= islands
+    body = (body | slits) & ~islands
     reach = SURELY_BEYOND * lattice.size
     depth = _distance(~body, lattice, reach) - _distance(body, lattice, reach)  # positive inside
     depth -= 0.5 * lattice.size * np.sign(depth)
