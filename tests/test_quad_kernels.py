@@ -7,6 +7,7 @@ import pytest
 from rough import no_boundary
 
 from scantruss.kernels.boundary.curves import Curves
+from scantruss.kernels.cells.collapse import collapse_edges
 from scantruss.kernels.cells.quads import (
     FLAT,
     corner_energy,
@@ -178,3 +179,30 @@ def test_a_trial_that_does_not_pay_leaves_no_trace() -> None:
     before = lattice.nodes.tobytes()
     assert lattice.try_change(5, lattice.quads[5][::-1].copy(), allowed=0.0) > 0.0
     assert lattice.nodes.tobytes() == before
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_sheet_stays_a_sheet_while_edges_collapse(seed: int) -> None:
+    """Whatever edges are given: every edge has one triangle on the boundary and two inside, and corners stay."""
+    rng, row = np.random.default_rng(seed), 7
+    at = np.arange(row * row).reshape(row, row)
+    low, right, up, far = (part.ravel() for part in (at[:-1, :-1], at[:-1, 1:], at[1:, :-1], at[1:, 1:]))
+    triangles = np.concatenate([np.column_stack([low, right, far]), np.column_stack([low, far, up])])
+    sides = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    edges, uses = np.unique(np.sort(sides, axis=1), axis=0, return_counts=True)
+    ends = edges[uses == 1].ravel()
+    held = np.zeros(row * row, np.int64)
+    held[ends] = 1
+    held[at[[0, 0, -1, -1], [0, -1, 0, -1]]] = 2
+    into = np.arange(row * row)
+    chosen = rng.permutation(edges)[: 20 + 15 * seed]
+    collapse_edges(chosen, held, triangles, ends, into)
+    left = triangles[triangles[:, 0] >= 0]
+    sides = np.sort(np.concatenate([left[:, [0, 1]], left[:, [1, 2]], left[:, [2, 0]]]), axis=1)
+    found, uses = np.unique(sides, axis=0, return_counts=True)
+    assert (sides[:, 0] < sides[:, 1]).all() and set(uses.tolist()) <= {1, 2}
+    assert len(np.unique(left)) - len(found) + len(left) == 1 and len(left) < len(triangles)
+    chain = np.sort(ends[ends >= 0].reshape(-1, 2), axis=1)
+    assert sorted(map(tuple, chain.tolist())) == sorted(map(tuple, found[uses == 1].tolist()))
+    assert (into[held == 2] == np.flatnonzero(held == 2)).all()
+    assert set(np.unique(left).tolist()) == set(np.flatnonzero(into == np.arange(len(into))).tolist())
