@@ -14,7 +14,7 @@ from typed import known
 
 import scantruss as st
 from scantruss import pipeline
-from scantruss.candidates import Attempt
+from scantruss.attempts import Attempt
 from scantruss.cli.main import main
 from scantruss.report.advice import LEAST_TRIED, MOST_TRIED, SURE_PER_SPACING, TRIED_AROUND, Advice, LengthTrial
 from scantruss.scan.member_length import length_range, round_length

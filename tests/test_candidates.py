@@ -16,9 +16,8 @@ from typed import known
 
 import scantruss as st
 from scantruss import candidates, pipeline
-from scantruss.candidates import LENGTHS, SMOOTHED, Attempt, attempts
+from scantruss.attempts import LENGTHS, MOST_RUNS, SMOOTHED, Attempt, AttemptLimit, attempts
 from scantruss.errors import CertificateError, FrontError
-from scantruss.hope import MOST_RUNS, Hope
 from scantruss.improve.optimize import improve_last
 from scantruss.scan.formats.writing import write_points
 
@@ -265,7 +264,7 @@ def test_fronts_that_would_all_miss_the_same_limbs_are_not_tried() -> None:
         return st.CertificateError("the grid leaves out 6 %", cast(Any, SimpleNamespace(certificate=found)))
 
     for kind, tried in (("limbs", False), ("far", True)):
-        hope = Hope()
+        limit = AttemptLimit()
         for _ in range(2):
-            hope.note(attempt, fault(kind))
-        assert hope.allows(attempt) == tried
+            limit.note(attempt, fault(kind))
+        assert limit.allows(attempt) == tried

@@ -33,7 +33,12 @@ def exists(name: str) -> bool:
 def test_what_a_page_names_exists(page: str) -> None:
     text = (DOCS / page).read_text(encoding="utf-8")
     packages = "|".join(path.stem for path in SOURCE.iterdir() if path.suffix in ("", ".py") and path.stem[0] != "_")
-    names = set(re.findall(rf"`((?:{packages})\.[\w.]+)`", text)) - {"pipeline.py", "candidates.py", "settings.py"}
+    names = set(re.findall(rf"`((?:{packages})\.[\w.]+)`", text)) - {
+        "pipeline.py",
+        "attempts.py",
+        "candidates.py",
+        "settings.py",
+    }
     names |= {name.removeprefix("scantruss.") for name in re.findall(r"^::: (\S+)", text, re.MULTILINE)}
     assert [name for name in sorted(names) if not exists(name)] == []
     for path in re.findall(r"`((?:\w+/)+\w+\.py)`", text):

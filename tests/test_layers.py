@@ -21,7 +21,7 @@ LAYERS = (  # lowest first; a module imports from its own row and from rows abov
     ("front",),
     ("improve", "check"),
     ("cells",),
-    ("pipeline", "candidates", "hope"),
+    ("pipeline", "candidates", "attempts"),
     ("structure", "layouts", "schedules", "setout", "export", "sweep"),
     ("report", "studio", "cli", "__main__"),
 )

@@ -1,9 +1,8 @@
-"""Multi-start: all attempts at a grid as one flat list, several fronts for an attempt, and the best of their grids that passes."""
+"""Multi-start: several fronts for an attempt, and the best of their grids that passes."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
@@ -11,27 +10,21 @@ from functools import partial
 from typing import TYPE_CHECKING, TypeVar
 
 from .check.certify import certified
-from .constraints.ridges import find_ridges
-from .errors import CertificateError, FrontError, ScanTrussError
+from .errors import FrontError
 from .front.advance import advance_front
-from .front.orientation_field import Field, FieldStart, orientation_fields
+from .front.orientation_field import Field, orientation_fields
 from .improve.equalize import energy_of_node
 from .improve.optimize import improve_first, improve_last
 from .improve.rings import finish_rings
 from .runtime.parallel import processors
 from .runtime.progress import Progress, WatchedProgress, seer_of
-from .settings import SAMPLE_SPACING
-from .surface.chosen_samples import ROD
-from .surface.samples import sample_surface
 from .surface.scratch import with_own_scratch
-from .surface.sharp_edges import EDGE_SHARE, FEWEST_NEEDED
 
 if TYPE_CHECKING:
     from .boundary.find import Boundary
     from .constraints.find import Constraints
     from .grid.grid import Grid
     from .improve.working_mesh import WorkingMesh
-    from .scan.cloud import PointCloud
     from .settings import Settings
     from .surface.samples import SurfaceSamples
 
@@ -44,144 +37,6 @@ MISSING_ENERGY, DISTANCE_ENERGY = 4.0, 0.1
 MISSED_MORE = 0.002  # share of the scan that the grid of a longer search may miss beyond that of a shorter one
 POOR_SHAPE = 0.4  # shape quality of its worst triangle below which a grid is poor: more finalists are tried
 FINALIST_BATCHES = 2  # times that finalists are tried
-# lengths of the fronts without rows, in desired lengths, tried in turn where no other passes
-LENGTHS = (1.0, 0.97, 1.04)
-COARSER_SAMPLES = (1.1, 1.2, 1.3)  # distances of the surface samples that are tried instead, in those of the settings
-SMOOTHED = (0.5, 1.0)  # scales over which a rough scan is smoothed where no grid passes without [member lengths]
-# shares of thick samples from which on a scan is rough, and so rough that its mean surface comes first
-ROUGH_SCAN, VERY_ROUGH_SCAN = 0.02, 0.25
-THINNER = (0.8, 0.0)  # girths below which limbs are cut off that are tried instead, in that of the settings
-MANY_OUTLIERS = 0.002  # share of the points that must be outliers for a grid to be tried without them
-FAULTS_WITHOUT_RIDGES = 6  # places at which ridges are given up, before they all are
-COARSEST_SAMPLES = 0.5  # largest of them, in desired lengths
-
-
-@dataclass(frozen=True)
-class Attempt:
-    """One attempt at a grid."""
-
-    settings: Settings
-    starts: tuple[FieldStart, ...] | None = (
-        None  #: how its fronts are laid out; None: as the effort of the settings allows
-    )
-    faults: tuple[tuple[float, float, float], ...] = ()  #: places at which ridges are given up [scan unit]
-
-    def after(self, fault: FrontError) -> Attempt | None:
-        """The same attempt with the ridges given up where it failed; None where that is not known or follows no ridge."""
-        found = fault.grid.certificate if fault.grid is not None else None
-        places = [each.where for each in found.faults if each.where] if found is not None else []
-        places += [fault.where] if fault.where else []
-        new = tuple(dict.fromkeys(place for place in places if place not in self.faults))
-        follows = self.settings.ridge_angle > 0.0 and self.settings.method == "default" and self.starts is None
-        return (
-            replace(self, faults=self.faults + new)
-            if new and follows and len(self.faults) < FAULTS_WITHOUT_RIDGES
-            else None
-        )
-
-    def advice(self, fault: ScanTrussError) -> str:
-        """Say with which settings a smoothed grid passes that only leaves out too much of the scan; nothing for any other."""
-        found = fault.grid.certificate if isinstance(fault, CertificateError) else None
-        if found is None or not self.settings.smooth_scale or {each.kind for each in found.faults} != {"cover"}:
-            return ""
-        return (
-            f"with --smooth-scale {self.settings.smooth_scale:g} --ridge-angle 0 --allow-missing"
-            f" {math.ceil(100.0 * found.missing) / 100.0:g} a grid of its mean surface passes"
-        )
-
-
-def attempts(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:
-    """Yield all attempts at a grid, the first as it was asked for; each of the others only where none before it passes.
-
-    Rather a grid without ridges than none, or one of the mean surface of a rough scan, or of another look at it: a scan so rough
-    that hardly a grid passes is another one to samples that lie a little farther apart. Method "paper" comes last.
-    """
-    yield from _same_scan(settings)
-    samples = sample_surface(cloud, settings)
-    rough, cut = samples.rough, len(samples.rings) > 0
-    if cut:  # fewer limbs cut off, then none
-        for share in THINNER:
-            yield Attempt(settings.replace(limb_girth=share * settings.limb_girth))
-    if rough > VERY_ROUGH_SCAN:
-        yield from _smoothed(cloud, settings)
-    if settings.method == "default":  # opening would cut off sharp edges
-        if not settings.sharp_edges and _has_sharp_edges(cloud, settings):
-            settings = settings.replace(sharp_edges=True)
-            yield from _same_scan(settings)
-        elif not settings.plain_body and not settings.sharp_edges and _is_body(cloud, settings):
-            yield from _same_scan(settings.replace(plain_body=True))
-    if settings.keep_rods and settings.method == "default" and _has_rods(cloud, settings):
-        settings = settings.replace(keep_rods=False)
-        yield from _same_scan(settings)
-    samples = sample_surface(cloud, settings)
-    if (
-        settings.ridge_angle > 0.0
-        and settings.method == "default"
-        and not samples.smooth
-        and find_ridges(samples, settings)
-    ):
-        settings = settings.replace(ridge_angle=0.0)
-        yield from _same_scan(settings)
-    if settings.judge_outliers == "auto" and settings.method == "default" and _has_more_outliers(cloud, settings):
-        settings = settings.replace(judge_outliers="always")
-        yield from _same_scan(settings)
-    if ROUGH_SCAN < rough <= VERY_ROUGH_SCAN:
-        yield from _smoothed(cloud, settings)
-    samples = sample_surface(cloud, settings)
-    if settings.method == "default":
-        if samples.smooth:
-            yield from _same_scan(settings.replace(box_size=SAMPLE_SPACING))
-        for size in (share * (settings.box_size or SAMPLE_SPACING) for share in COARSER_SAMPLES):
-            if size <= COARSEST_SAMPLES:
-                yield from _same_scan(settings.replace(box_size=size))
-        yield from _same_scan(settings.replace(method="paper"))
-
-
-def _has_more_outliers(cloud: PointCloud, settings: Settings) -> bool:
-    """Whether there are outliers that do not show where samples stand alone, as they are many or the members long."""
-    always = sample_surface(cloud, settings.replace(judge_outliers="always")).outliers
-    return always > MANY_OUTLIERS * len(cloud.points) and always > sample_surface(cloud, settings).outliers
-
-
-def _has_sharp_edges(cloud: PointCloud, settings: Settings) -> bool:
-    """Whether so many samples lie on sharp edges that these are to be looked at."""
-    on_edge = sample_surface(cloud, settings.replace(sharp_edges=True)).on_edge
-    return bool(on_edge.sum() >= max(FEWEST_NEEDED, EDGE_SHARE * len(on_edge)))
-
-
-def _is_body(cloud: PointCloud, settings: Settings) -> bool:
-    """Whether the scan encloses a body with limbs to take off or slits to fill."""
-    samples = sample_surface(cloud, settings.replace(plain_body=True))
-    return samples.measured < len(samples.surface.mean)
-
-
-def _has_rods(cloud: PointCloud, settings: Settings) -> bool:
-    """Whether a part of the scan is too thin for a grid, as columns and scaffold are.
-
-    Where limbs can be cut off, such parts are limbs too, and count as missing, unless the scan falls apart without them, as a hall does.
-    """
-    cut, without = sample_surface(cloud, settings), sample_surface(cloud, settings.replace(keep_rods=False))
-    parts = [len(each.pieces) + len(each.not_chosen) for each in (cut, without)]
-    return bool((without.judged == ROD).any()) and (not cut.rings or parts[1] > parts[0])
-
-
-def _smoothed(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:
-    """Yield the attempts at a grid of the mean surface, where the settings leave open what is smoothed away."""
-    if settings.method == "default" and settings.smooth_scale is None:
-        for scale in SMOOTHED:
-            smoothed = settings.replace(smooth_scale=scale, ridge_angle=0.0)
-            if sample_surface(cloud, smoothed).layers[1] > 0.0:  # two sheets would become one
-                return
-            yield Attempt(smoothed)
-            yield Attempt(smoothed, (FieldStart(scale=LENGTHS[0], laid=False),))
-
-
-def _same_scan(settings: Settings) -> Iterator[Attempt]:
-    """Yield the attempts with one look at the scan: by rows, then by fronts that make all of their nodes themselves."""
-    if settings.method == "default":
-        yield Attempt(settings)
-    for share in LENGTHS:
-        yield Attempt(settings, (FieldStart(scale=share, laid=False),))
 
 
 @dataclass(eq=False)

@@ -8,8 +8,9 @@ from time import perf_counter
 
 import numpy as np
 
+from .attempts import Attempt, AttemptLimit, attempts
 from .boundary.find import find_boundary
-from .candidates import Attempt, advance_fronts, attempts, best_that_passes, improve_fronts
+from .candidates import advance_fronts, best_that_passes, improve_fronts
 from .cells.make import settings_of_triangles, with_cells
 from .check.certify import certified
 from .check.limits import with_ridges_given_up
@@ -17,7 +18,6 @@ from .constraints.find import find_constraints
 from .errors import CertificateError, FrontError, OneSidedError, ScanTrussError
 from .front.orientation_field import orientation_fields
 from .grid.grid import Grid
-from .hope import Hope
 from .improve.mirrored import MIRROR_LINE, check_lines_kept, mirror_lines, mirrored_grid, sides_of
 from .runtime.progress import Progress, seer_of
 from .scan.cloud import PointCloud
@@ -166,7 +166,7 @@ def first_that_passes(
     settings: Settings,
     tried: Iterable[Attempt],
     *,
-    hope: Hope | None = None,
+    limit: AttemptLimit | None = None,
     progress: Progress | None = None,
 ) -> Grid:
     """Return the grid of the first attempt that passes the checks.
@@ -178,7 +178,7 @@ def first_that_passes(
         Those that were asked for.
     tried : iterable of Attempt
         The attempts in their order.
-    hope : Hope, optional
+    limit : AttemptLimit, optional
         How many are worth making.
 
     Raises
@@ -188,12 +188,12 @@ def first_that_passes(
         of a grid of the mean surface that only leaves out too much.
     """
     faults: list[ScanTrussError] = []
-    hope, advice = hope or Hope(settings.cells), ""
+    limit, advice = limit or AttemptLimit(settings.cells), ""
     for attempt in tried:
-        if not hope.allows(attempt):
+        if not limit.allows(attempt):
             continue
         try:
-            return make_grid_with_most_ridges(cloud, attempt, hope, progress=progress)
+            return make_grid_with_most_ridges(cloud, attempt, limit, progress=progress)
         except ScanTrussError as error:
             looks_one_sided = bool(faults) and isinstance(faults[0], OneSidedError)  # where its mean surface does not
             if attempt.settings == settings:  # what goes wrong with other settings, nobody has asked for
@@ -203,8 +203,8 @@ def first_that_passes(
             elif looks_one_sided and isinstance(error, FrontError):
                 faults.append(error)
             advice = advice or attempt.advice(error)
-            hope.note(attempt, error)
-        if not hope.is_left():
+            limit.note(attempt, error)
+        if not limit.any_left():
             break
     if not faults:
         raise FrontError("none of the attempts made gives a grid that passes")
@@ -215,15 +215,15 @@ def first_that_passes(
 
 
 def make_grid_with_most_ridges(
-    cloud: PointCloud, attempt: Attempt, hope: Hope, *, progress: Progress | None = None
+    cloud: PointCloud, attempt: Attempt, limit: AttemptLimit, *, progress: Progress | None = None
 ) -> Grid:
     """Return the grid of one attempt; where it fails, ridges are given up near the faults, a few times, and a warning says so."""
     first: FrontError | None = None
     later: Attempt | None = attempt
     while later is not None and (
-        first is None or hope.is_left()
+        first is None or limit.any_left()
     ):  # each turn gives up ridges at one more place at least
-        hope.begin()
+        limit.begin()
         try:
             return with_ridges_given_up(make_grid(cloud, later, progress=progress), later.faults)
         except FrontError as error:

@@ -12,16 +12,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..candidates import attempts
+from ..attempts import AttemptLimit, attempts
 from ..errors import FrontError, LengthError, OneSidedError
-from ..hope import Hope
 from ..pipeline import first_that_passes
 from ..scan.member_length import exact_range, length_range, round_length, suggest_length
 from ..surface.samples import sample_surface
 from ..surface.size_field import measured_bends
 
 if TYPE_CHECKING:
-    from ..candidates import Attempt
+    from ..attempts import Attempt
     from ..grid.grid import Grid
     from ..runtime.progress import Progress
     from ..scan.cloud import PointCloud
@@ -111,7 +110,9 @@ class Advice:
         self._cloud, self._progress = cloud, progress
         self._settings = settings.replace(effort="quick", length_field="")
         self._found: dict[float, LengthTrial] = {}
-        self._begun: dict[float, tuple[Settings, Iterator[Attempt], Hope]] = {}  # what is left to try of each length
+        self._begun: dict[
+            float, tuple[Settings, Iterator[Attempt], AttemptLimit]
+        ] = {}  # what is left to try of each length
         self.is_spent = False  #: whether a suggestion was looked for
         self._usual = suggest_length(cloud)
         self._count_at(self._usual, MOST_TRIED)
@@ -144,13 +145,13 @@ class Advice:
             return known
         if length not in self._begun:
             settings = self._settings.replace(length=length)
-            self._begun[length] = (settings, attempts(self._cloud, settings), Hope(settings.cells))
-        settings, tried, hope = self._begun[length]
-        before = hope.runs
-        hope.allow(allowed)
+            self._begun[length] = (settings, attempts(self._cloud, settings), AttemptLimit(settings.cells))
+        settings, tried, limit = self._begun[length]
+        before = limit.runs
+        limit.allow(allowed)
         grid, fault = None, known.fault if known is not None else None
         try:
-            grid = first_that_passes(self._cloud, settings, tried, hope=hope, progress=self._show(length))
+            grid = first_that_passes(self._cloud, settings, tried, limit=limit, progress=self._show(length))
             made = grid.settings or settings  # what one length needed to pass, the others will need too
             self._settings = self._settings.replace(
                 keep_rods=made.keep_rods,
@@ -160,9 +161,9 @@ class Advice:
             )
         except (FrontError, LengthError, OneSidedError) as error:
             fault = fault or (error if isinstance(error, FrontError) else FrontError(str(error)))
-        self._left -= cost * (hope.runs - before)
-        paused = hope.is_paused() and hope.runs > before
-        trial = LengthTrial(length, grid, None if grid is not None else fault, hope.runs, paused)
+        self._left -= cost * (limit.runs - before)
+        paused = limit.is_paused() and limit.runs > before
+        trial = LengthTrial(length, grid, None if grid is not None else fault, limit.runs, paused)
         self._found[length] = trial
         return trial
 

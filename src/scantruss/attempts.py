@@ -1,0 +1,224 @@
+"""All attempts at a grid as one flat list, and how many of them are worth making."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from .constraints.ridges import find_ridges
+from .errors import CertificateError, FrontError, OneSidedError, ScanTrussError
+from .front.orientation_field import FieldStart
+from .settings import SAMPLE_SPACING
+from .surface.chosen_samples import ROD
+from .surface.samples import sample_surface
+from .surface.sharp_edges import EDGE_SHARE, FEWEST_NEEDED
+
+if TYPE_CHECKING:
+    from .scan.cloud import PointCloud
+    from .settings import Settings
+
+# lengths of the fronts without rows, in desired lengths, tried in turn where no other passes
+LENGTHS = (1.0, 0.97, 1.04)
+COARSER_SAMPLES = (1.1, 1.2, 1.3)  # distances of the surface samples that are tried instead, in those of the settings
+SMOOTHED = (0.5, 1.0)  # scales over which a rough scan is smoothed where no grid passes without [member lengths]
+# shares of thick samples from which on a scan is rough, and so rough that its mean surface comes first
+ROUGH_SCAN, VERY_ROUGH_SCAN = 0.02, 0.25
+THINNER = (0.8, 0.0)  # girths below which limbs are cut off that are tried instead, in that of the settings
+MANY_OUTLIERS = 0.002  # share of the points that must be outliers for a grid to be tried without them
+FAULTS_WITHOUT_RIDGES = 6  # places at which ridges are given up, before they all are
+COARSEST_SAMPLES = 0.5  # largest of them, in desired lengths
+FAR_FROM_PASSING = 12  # cuts and missing boundary loops above which other fronts with the same samples do not help
+# share of the scan that a grid misses above which the same holds, in shares that may be missing; of thin limbs 1
+FAR_MISSING = 2.0
+MOST_RUNS = 24  # grids that are made at most, before a scan is refused
+MOST_RUNS_OF_CELLS = 3  # the same for quads and hexagons, which are made of triangles that pass
+MOST_FAR, MOST_GIVEN_UP = 2, 3  # attempts in a row of the same settings that are so far from passing, and such settings
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """One attempt at a grid."""
+
+    settings: Settings
+    starts: tuple[FieldStart, ...] | None = (
+        None  #: how its fronts are laid out; None: as the effort of the settings allows
+    )
+    faults: tuple[tuple[float, float, float], ...] = ()  #: places at which ridges are given up [scan unit]
+
+    def after(self, fault: FrontError) -> Attempt | None:
+        """The same attempt with the ridges given up where it failed; None where that is not known or follows no ridge."""
+        found = fault.grid.certificate if fault.grid is not None else None
+        places = [each.where for each in found.faults if each.where] if found is not None else []
+        places += [fault.where] if fault.where else []
+        new = tuple(dict.fromkeys(place for place in places if place not in self.faults))
+        follows = self.settings.ridge_angle > 0.0 and self.settings.method == "default" and self.starts is None
+        return (
+            replace(self, faults=self.faults + new)
+            if new and follows and len(self.faults) < FAULTS_WITHOUT_RIDGES
+            else None
+        )
+
+    def advice(self, fault: ScanTrussError) -> str:
+        """Say with which settings a smoothed grid passes that only leaves out too much of the scan; nothing for any other."""
+        found = fault.grid.certificate if isinstance(fault, CertificateError) else None
+        if found is None or not self.settings.smooth_scale or {each.kind for each in found.faults} != {"cover"}:
+            return ""
+        return (
+            f"with --smooth-scale {self.settings.smooth_scale:g} --ridge-angle 0 --allow-missing"
+            f" {math.ceil(100.0 * found.missing) / 100.0:g} a grid of its mean surface passes"
+        )
+
+
+def attempts(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:
+    """Yield all attempts at a grid, the first as it was asked for; each of the others only where none before it passes.
+
+    Rather a grid without ridges than none, or one of the mean surface of a rough scan, or of another look at it: a scan so rough
+    that hardly a grid passes is another one to samples that lie a little farther apart. Method "paper" comes last.
+    """
+    yield from _same_scan(settings)
+    samples = sample_surface(cloud, settings)
+    rough, cut = samples.rough, len(samples.rings) > 0
+    if cut:  # fewer limbs cut off, then none
+        for share in THINNER:
+            yield Attempt(settings.replace(limb_girth=share * settings.limb_girth))
+    if rough > VERY_ROUGH_SCAN:
+        yield from _smoothed(cloud, settings)
+    if settings.method == "default":  # opening would cut off sharp edges
+        if not settings.sharp_edges and _has_sharp_edges(cloud, settings):
+            settings = settings.replace(sharp_edges=True)
+            yield from _same_scan(settings)
+        elif not settings.plain_body and not settings.sharp_edges and _is_body(cloud, settings):
+            yield from _same_scan(settings.replace(plain_body=True))
+    if settings.keep_rods and settings.method == "default" and _has_rods(cloud, settings):
+        settings = settings.replace(keep_rods=False)
+        yield from _same_scan(settings)
+    samples = sample_surface(cloud, settings)
+    if (
+        settings.ridge_angle > 0.0
+        and settings.method == "default"
+        and not samples.smooth
+        and find_ridges(samples, settings)
+    ):
+        settings = settings.replace(ridge_angle=0.0)
+        yield from _same_scan(settings)
+    if settings.judge_outliers == "auto" and settings.method == "default" and _has_more_outliers(cloud, settings):
+        settings = settings.replace(judge_outliers="always")
+        yield from _same_scan(settings)
+    if ROUGH_SCAN < rough <= VERY_ROUGH_SCAN:
+        yield from _smoothed(cloud, settings)
+    samples = sample_surface(cloud, settings)
+    if settings.method == "default":
+        if samples.smooth:
+            yield from _same_scan(settings.replace(box_size=SAMPLE_SPACING))
+        for size in (share * (settings.box_size or SAMPLE_SPACING) for share in COARSER_SAMPLES):
+            if size <= COARSEST_SAMPLES:
+                yield from _same_scan(settings.replace(box_size=size))
+        yield from _same_scan(settings.replace(method="paper"))
+
+
+def _has_more_outliers(cloud: PointCloud, settings: Settings) -> bool:
+    """Whether there are outliers that do not show where samples stand alone, as they are many or the members long."""
+    always = sample_surface(cloud, settings.replace(judge_outliers="always")).outliers
+    return always > MANY_OUTLIERS * len(cloud.points) and always > sample_surface(cloud, settings).outliers
+
+
+def _has_sharp_edges(cloud: PointCloud, settings: Settings) -> bool:
+    """Whether so many samples lie on sharp edges that these are to be looked at."""
+    on_edge = sample_surface(cloud, settings.replace(sharp_edges=True)).on_edge
+    return bool(on_edge.sum() >= max(FEWEST_NEEDED, EDGE_SHARE * len(on_edge)))
+
+
+def _is_body(cloud: PointCloud, settings: Settings) -> bool:
+    """Whether the scan encloses a body with limbs to take off or slits to fill."""
+    samples = sample_surface(cloud, settings.replace(plain_body=True))
+    return samples.measured < len(samples.surface.mean)
+
+
+def _has_rods(cloud: PointCloud, settings: Settings) -> bool:
+    """Whether a part of the scan is too thin for a grid, as columns and scaffold are.
+
+    Where limbs can be cut off, such parts are limbs too, and count as missing, unless the scan falls apart without them, as a hall does.
+    """
+    cut, without = sample_surface(cloud, settings), sample_surface(cloud, settings.replace(keep_rods=False))
+    parts = [len(each.pieces) + len(each.not_chosen) for each in (cut, without)]
+    return bool((without.judged == ROD).any()) and (not cut.rings or parts[1] > parts[0])
+
+
+def _smoothed(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:
+    """Yield the attempts at a grid of the mean surface, where the settings leave open what is smoothed away."""
+    if settings.method == "default" and settings.smooth_scale is None:
+        for scale in SMOOTHED:
+            smoothed = settings.replace(smooth_scale=scale, ridge_angle=0.0)
+            if sample_surface(cloud, smoothed).layers[1] > 0.0:  # two sheets would become one
+                return
+            yield Attempt(smoothed)
+            yield Attempt(smoothed, (FieldStart(scale=LENGTHS[0], laid=False),))
+
+
+def _same_scan(settings: Settings) -> Iterator[Attempt]:
+    """Yield the attempts with one look at the scan: by rows, then by fronts that make all of their nodes themselves."""
+    if settings.method == "default":
+        yield Attempt(settings)
+    for share in LENGTHS:
+        yield Attempt(settings, (FieldStart(scale=share, laid=False),))
+
+
+class AttemptLimit:
+    """Which attempts are still worth making.
+
+    After two in a row that come nowhere near a grid that passes, others of the same settings would come no nearer; after three
+    such settings none would. A scan that looks one-sided may only be rough: then its mean surface is not. How much is tried is
+    counted in grids that are made, not in seconds: the same scan gets the same result.
+    """
+
+    def __init__(self, cells: str = "triangle") -> None:
+        self._most = MOST_RUNS if cells == "triangle" else min(MOST_RUNS, MOST_RUNS_OF_CELLS)
+        self._allowed = self._most
+        self._settings: Settings | None = None
+        self._far = self._given_up = 0
+        self.runs, self._looks_one_sided = 0, False  #: grids that were made
+
+    def allow(self, more: int) -> None:
+        """Pause after some more grids."""
+        self._allowed = min(self._most, self.runs + more)
+
+    def any_left(self) -> bool:
+        """Whether any attempt is worth making, and allowed."""
+        return self._given_up < MOST_GIVEN_UP and self.runs < self._allowed
+
+    def is_paused(self) -> bool:
+        """Whether attempts would be worth making that are not allowed."""
+        return self._given_up < MOST_GIVEN_UP and self._allowed <= self.runs < self._most
+
+    def begin(self) -> None:
+        """Note that a grid is made."""
+        self.runs += 1
+
+    def allows(self, attempt: Attempt) -> bool:
+        """Whether an attempt is worth making."""
+        if self._looks_one_sided and not attempt.settings.smooth_scale:
+            return False
+        return attempt.settings is not self._settings or self._far < MOST_FAR
+
+    def note(self, attempt: Attempt, fault: ScanTrussError) -> None:
+        """Note what has come of an attempt."""
+        if attempt.settings is not self._settings:
+            self._settings, self._far = attempt.settings, 0
+        self._looks_one_sided |= isinstance(fault, OneSidedError)
+        self._far = self._far + 1 if _is_far_from_passing(attempt, fault) else 0
+        self._given_up += self._far == MOST_FAR and not attempt.settings.smooth_scale  # of those there are four
+
+
+def _is_far_from_passing(attempt: Attempt, fault: ScanTrussError) -> bool:
+    """Whether a grid misses many loops or much of the scan, or limbs as every front will, or many of its triangles cut each other."""
+    if isinstance(fault, OneSidedError):
+        return True
+    if not isinstance(fault, CertificateError) or fault.grid.certificate is None:
+        return False
+    found = fault.grid.certificate
+    limbs = sum(part.share for part in found.left_out if part.kind == "limbs")
+    if found.missing > FAR_MISSING * attempt.settings.allow_missing or limbs > attempt.settings.allow_missing:
+        return True
+    return found.crossings + abs(found.boundary_loops - found.scan_loops) > FAR_FROM_PASSING
