@@ -10,11 +10,11 @@ from functools import partial
 from typing import TYPE_CHECKING, TypeVar
 
 from .check.certify import certified
-from .errors import FrontError
+from .errors import CertificateError, FrontError, Place
 from .front.advance import advance_front
 from .front.orientation_field import Field, orientation_fields
 from .improve.equalize import energy_of_node
-from .improve.optimize import improve_first, improve_last
+from .improve.optimize import improve_first, improve_last, with_tips
 from .improve.rings import finish_rings
 from .runtime.parallel import processors
 from .runtime.progress import Progress, WatchedProgress, seer_of
@@ -35,6 +35,7 @@ FULLY_IMPROVED = {"quick": 1, "normal": 1, "best": 3}  # fronts that are improve
 # energy a node of the share of the scan that is missed, of its distance at 95 % [members]
 MISSING_ENERGY, DISTANCE_ENERGY = 4.0, 0.1
 MISSED_MORE = 0.002  # share of the scan that the grid of a longer search may miss beyond that of a shorter one
+TRIALS_OF_TIPS = 3  # times that nodes are put on tips, each without those near the faults of the ones before
 POOR_SHAPE = 0.4  # shape quality of its worst triangle below which a grid is poor: more finalists are tried
 FINALIST_BATCHES = 2  # times that finalists are tried
 
@@ -154,6 +155,7 @@ def best_that_passes(
             grid = improve_last(candidate.mesh, candidate.front, samples, constraints, candidate.settings)
             grid = finish_rings(grid, boundary)
             candidate.grid = certified(grid.replace(settings=settings), samples, boundary, settings)
+            reach_tips_of(candidate, samples, boundary, constraints, settings)
         except FrontError as error:
             candidate.fault = error
 
@@ -172,6 +174,35 @@ def best_that_passes(
     if settings.effort == "best" and settings.method == "default":
         return no_worse(passed, samples, boundary, constraints, settings)
     return chosen(passed)
+
+
+def reach_tips_of(
+    candidate: Candidate, samples: SurfaceSamples, boundary: Boundary, constraints: Constraints, settings: Settings
+) -> None:
+    """Put nodes on the tips of the scan that a grid misses, as far as it still passes and is better for it.
+
+    Near faults that come of it tips are given up, a few times; each turn gives up those of one more place.
+    """
+    faults: list[Place] = []
+    usual = candidate.mesh.copied()
+    for _ in range(TRIALS_OF_TIPS if settings.method == "default" else 0):
+        before, cost = candidate.grid, candidate.cost
+        try:
+            grid = with_tips(candidate.mesh, candidate.front, samples, constraints, candidate.settings, faults)
+            if grid is None:
+                break
+            grid = finish_rings(grid, boundary)
+            candidate.grid = certified(grid.replace(settings=settings), samples, boundary, settings)
+            if candidate.cost < cost:
+                return
+            candidate.grid = before
+            break
+        except CertificateError as error:
+            candidate.mesh.restore(usual)
+            if error.where is None:
+                break
+            faults.append(error.where)
+    candidate.mesh.restore(usual)
 
 
 def chosen(passed: Sequence[Candidate]) -> Grid:

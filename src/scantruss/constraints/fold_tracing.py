@@ -35,7 +35,11 @@ FOLD_OVER_SMOOTH = 10.0  # how much better a fold must fit than a smooth surface
 ROUGHEST_SIDE = 0.12  # points farther from a fold than this follow neither side [member lengths]
 LOOK_SPACING = 0.33  # places closer together than this are not looked at twice [member lengths]
 MOST_SAMPLES = 4000  # most samples from which folds are looked for, the sharpest first
-MOST_FALSE_FOLDS = 12  # places that look folded and are no ridge, after which the search stops: the scan is rough
+FALSE_FOLDS_OF_ROUGH = (
+    12  # places in a row that look folded and are no ridge, after which the scan is rough: only long ridges count
+)
+MOST_FALSE_FOLDS = 80  # such places in a row after which the search stops
+LEAST_ROUGH_RIDGE = 6.0  # least length of a line of folds on a rough scan [member lengths]
 MISSED_PLACES = 2  # places in a row at which a fold may not be seen and still goes on
 LEAST_TURN_COSINE = 0.94  # least cosine of the turn of a fold from place to place
 PLACES_OF_SHORTEST_RING = 6  # places along the shortest ring
@@ -106,12 +110,13 @@ class Tracer:
         fresh = np.ones(len(seeds), bool)
         places = self.surface.mean[seeds]
         ridges: list[np.ndarray] = []
-        misses = 0
+        misses, rough = 0, False
         for k, sample in enumerate(seeds.tolist()):
             if not fresh[k]:
                 continue
             fold = self.fold_at(sample, places[k], np.zeros(3))
             misses += 1
+            rough |= misses > FALSE_FOLDS_OF_ROUGH
             if misses > MOST_FALSE_FOLDS:
                 break
             if (
@@ -121,7 +126,8 @@ class Tracer:
             ):
                 folds = self._follow(sample, fold, [ridge[:, :3] for ridge in ridges])
                 self.watch.note(len(folds), folds[-1, :3] + self.origin)
-                even = [part for part in parts_of(folds) if is_even(part, WEAK_FOLD * self.angle, self.sharpest)]
+                least = LEAST_ROUGH_RIDGE if rough else SHORTEST_LINE_OF_FOLDS
+                even = [part for part in parts_of(folds) if is_even(part, WEAK_FOLD * self.angle, self.sharpest, least)]
                 ridges += even
                 misses = 0 if even else misses
                 for place in folds[:, :3]:
@@ -274,10 +280,12 @@ def parts_of(folds: np.ndarray) -> list[np.ndarray]:
     return [*parts, folds[first:]]
 
 
-def is_even(folds: np.ndarray, angle: float, sharpest: float = SHARPEST_FOLD_ANGLE) -> bool:
+def is_even(
+    folds: np.ndarray, angle: float, sharpest: float = SHARPEST_FOLD_ANGLE, least: float = SHORTEST_LINE_OF_FOLDS
+) -> bool:
     """Whether a line of folds (K, FOUND), a stride apart, has an angle and is as even as a ridge: what bends evenly is."""
     angles = folds[:, BEND]
-    if len(folds) * FOLD_STRIDE < SHORTEST_LINE_OF_FOLDS or (angles >= angle).sum() * FOLD_STRIDE < LEAST_FULL_LENGTH:
+    if len(folds) * FOLD_STRIDE < least or (angles >= angle).sum() * FOLD_STRIDE < LEAST_FULL_LENGTH:
         return False
     ahead = np.diff(folds[:, :3], axis=0)
     ahead /= np.maximum(np.linalg.norm(ahead, axis=1), 1e-300)[:, None]

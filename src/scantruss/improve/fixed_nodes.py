@@ -7,7 +7,7 @@ import numpy as np
 from ..constraints.fixed_nodes import place_text
 from ..errors import InputError
 from ..kernels.boundary.curves import nearest_on_curves
-from ..kernels.mesh.grid import AT_REST, ON_CURVE, may_split, split
+from ..kernels.mesh.grid import AT_REST, ON_CURVE, Net, may_split, split
 from ..kernels.mesh.point_location import nearest_sample
 from ..kernels.mesh.trial import Scratch, total_energy
 from ..kernels.surface.local_surface import NEAREST_SAMPLE
@@ -18,6 +18,8 @@ from .working_mesh import WorkingMesh
 # distance from the boundary up to which a fixed node becomes a boundary node [member lengths]
 BOUNDARY_NODE_REACH = 0.33
 SAME_PLACE = 1e-6  # distance up to which a node is already at a position [member lengths]
+SEARCHED_RINGS = 2  # rings around a fixed node in which moves are tried
+SETTLED_RINGS = 5  # rings around it that settle where only these do
 NEAREST_TRIED = 3  # number of the nearest nodes, and of the nearest edges, that are tried for a fixed node
 
 
@@ -100,20 +102,20 @@ def fix_nodes(mesh: WorkingMesh, positions: np.ndarray) -> None:
         if (v := _node_at(mesh, place)) >= 0:
             _put_node(mesh, v, place)
             continue
-        start, best, least = _copy(mesh), None, np.inf
-        for way in _ways(mesh, place):
-            _restore(mesh, start)
-            _take(mesh, scratch, way, place)
+        start, best, least = mesh.copied(), None, np.inf
+        for way in ways_to_place(mesh, place):
+            mesh.restore(start)
+            take_place(mesh, scratch, way, place)
             energy = total_energy(mesh.net, mesh.patches, scratch, mesh.length, LENGTH_WEIGHT)[0]
             if energy < least:
-                best, least = _copy(mesh), energy
+                best, least = mesh.copied(), energy
         if best is None:
             raise _no_node(place)
-        _restore(mesh, best)
+        mesh.restore(best)
 
 
-def _ways(mesh: WorkingMesh, place: np.ndarray) -> list[tuple[int, int]]:
-    """Ways to a node at a place: (node, -1) to be moved, (a, b) an edge to be split."""
+def ways_to_place(mesh: WorkingMesh, place: np.ndarray) -> list[tuple[int, int]]:
+    """Return ways to a node at a place: (node, -1) to be moved, (a, b) an edge to be split."""
     net = mesh.net
     nodes = _candidates(mesh, place)[:NEAREST_TRIED].tolist()
     edges = []
@@ -129,8 +131,10 @@ def _ways(mesh: WorkingMesh, place: np.ndarray) -> list[tuple[int, int]]:
     return [(v, -1) for v in nodes] + [edges[i] for i in order]
 
 
-def _take(mesh: WorkingMesh, scratch: Scratch, way: tuple[int, int], place: np.ndarray) -> None:
-    """Make a node at a place in one way, and improve the grid around it."""
+def take_place(
+    mesh: WorkingMesh, scratch: Scratch, way: tuple[int, int], place: np.ndarray, *, around: bool = False
+) -> None:
+    """Make a node at a place in one way, and improve the grid; `around`: let only the nodes around it settle."""
     net = mesh.net
     v, b = way
     if b >= 0:
@@ -139,21 +143,17 @@ def _take(mesh: WorkingMesh, scratch: Scratch, way: tuple[int, int], place: np.n
         mesh.patches[v, NEAREST_SAMPLE] = nearest_sample(mesh.surface, *place.tolist())
         net.ideal[v] = 4 if net.is_open[v] else 6
     _put_node(mesh, v, place)
-    around = {v}
-    for _ in range(2):
-        around |= {u for w in around for u in net.ring[w, : net.degree[w]].tolist()}
-    scratch.tried[sorted(around)] = 0
+    scratch.tried[nodes_around(net, v, SEARCHED_RINGS)] = 0
     for _ in range(3):
         mesh.renew(FARTHEST_ON_THE_WAY)
-        settle(mesh, LENGTH_WEIGHT, 1e-3, 6)
+        settle(mesh, LENGTH_WEIGHT, 1e-3, 6, independent_sets=[nodes_around(net, v, SETTLED_RINGS)] if around else None)
         if search_once(mesh, scratch) == 0:
             break
 
 
-def _copy(mesh: WorkingMesh) -> tuple[np.ndarray, ...]:
-    return tuple(array.copy() for array in (*mesh.net, mesh.patches, mesh.fixed))
-
-
-def _restore(mesh: WorkingMesh, kept: tuple[np.ndarray, ...]) -> None:
-    for array, value in zip((*mesh.net, mesh.patches, mesh.fixed), kept, strict=True):
-        array[:] = value
+def nodes_around(net: Net, v: int, rings: int) -> np.ndarray:
+    """Return the nodes within some members of a node, (K,) int64."""
+    near = {v}
+    for _ in range(rings):
+        near |= {u for w in near for u in net.ring[w, : net.degree[w]].tolist()}
+    return np.array(sorted(near))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,11 +18,13 @@ from .flips import flip_by_angle
 from .perturbation import search_widely
 from .sliding_nodes import with_boundary_members, with_line_sets
 from .smoothing import smooth
+from .tips import reach_tips
 from .working_mesh import WorkingMesh
 
 if TYPE_CHECKING:
     from ..boundary.find import Boundary
     from ..constraints.find import Constraints
+    from ..errors import Place
     from ..settings import Settings
     from ..surface.samples import SurfaceSamples
 
@@ -128,6 +130,30 @@ def improve_last(
     if settings.method == "default":
         search_widely(mesh, settings.effort, report)
         fix_nodes(mesh, constraints.positions)
+    return put_down(mesh, front, samples, constraints, settings)
+
+
+def with_tips(
+    mesh: WorkingMesh,
+    front: Grid,
+    samples: SurfaceSamples,
+    constraints: Constraints,
+    settings: Settings,
+    faults: Sequence[Place] = (),
+) -> Grid | None:
+    """Return the grid of a mesh that was put down, with nodes on the tips of the scan; None where it has no more tips.
+
+    faults : places [scan unit] where such grids failed
+    """
+    if not reach_tips(mesh, front, samples, faults):
+        return None
+    return put_down(mesh, front, samples, constraints, settings)
+
+
+def put_down(
+    mesh: WorkingMesh, front: Grid, samples: SurfaceSamples, constraints: Constraints, settings: Settings
+) -> Grid:
+    """Let a mesh come to rest, and return it as a grid on the scan."""
 
     def come_to_rest() -> None:
         if settings.method == "paper":

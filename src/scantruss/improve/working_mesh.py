@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -111,6 +112,14 @@ def _lines_of(net: Net, merged: np.ndarray, kept: np.ndarray) -> np.ndarray:
             if net.line[v] >> i & 1:
                 pairs.add(tuple(sorted(np.searchsorted(kept, merged[[v, u]]).tolist())))
     return np.array(sorted(pairs), np.int64).reshape(-1, 2)
+
+
+class Kept(NamedTuple):
+    """A working mesh as it was."""
+
+    net: Net
+    patches: np.ndarray  #: (C, PATCH_COLUMNS)
+    fixed: np.ndarray  #: (C,) bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -244,6 +253,17 @@ class WorkingMesh:
         self.renew(0.05)
         point_location.distances_from_scan(self.net, self.patches, values)
         return values
+
+    def copied(self) -> Kept:
+        """A copy of what trials change."""
+        return Kept(Net(*(array.copy() for array in self.net)), self.patches.copy(), self.fixed.copy())
+
+    def restore(self, kept: Kept) -> None:
+        """Put the mesh back to a copy."""
+        for array, value in zip(
+            (*self.net, self.patches, self.fixed), (*kept.net, kept.patches, kept.fixed), strict=True
+        ):
+            array[:] = value
 
     def close(self, grid: Grid) -> Closed:
         """Close the net, with all else as in `grid`, and compute its topology."""
