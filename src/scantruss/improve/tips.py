@@ -1,0 +1,107 @@
+"""Tips: where the scan sticks out of a grid or sinks into it, a node is put on the farthest place.
+
+Even members and regular triangles draw a grid off ears, toes and beaks that are about a member thick: nothing in its energy knows that the
+scan goes on. So the grid is measured against the samples, and each tip gets a node in the way that disturbs the grid least, as a fixed
+position does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..kernels.boundary.curves import nearest_on_curves
+from ..kernels.mesh.distances import nearest_triangles, triangle_boxes
+from ..kernels.mesh.trial import Scratch, total_energy
+from .equalize import LENGTH_WEIGHT, new_scratch
+from .fixed_nodes import take_place, ways_to_place
+from .working_mesh import WorkingMesh, close_net
+
+if TYPE_CHECKING:
+    from ..errors import Place
+    from ..grid.grid import Grid
+    from ..surface.samples import SurfaceSamples
+
+TIP = 0.4  # distance of a tip from the grid, at least [member lengths]
+FARTHEST_TIP = 1.2  # what is farther away is no tip but a part without a grid [member lengths]
+TIPS_APART = 1.0  # least distance between two tips [member lengths]
+TIP_TO_BOUNDARY = 0.5  # distance from the boundary within which no tip is looked for [member lengths]
+GIVEN_UP_WITHIN = 3.0  # distance from a fault within which tips are given up [member lengths]
+MOST_TIPS = 40  # most tips at a time, the farthest first
+ENERGY_OF_TIP = 1.0  # most energy that a node on a tip may cost
+ROUNDS = 2  # times that tips are looked for: the second may lie beside a first
+
+
+def reach_tips(mesh: WorkingMesh, front: Grid, samples: SurfaceSamples, faults: Sequence[Place] = ()) -> int:
+    """Put nodes on the tips of a scan, where they stay at rest; returns how many.
+
+    Parameters
+    ----------
+    mesh : WorkingMesh
+    front : Grid
+        What the mesh was opened from.
+    samples : SurfaceSamples
+    faults : places [scan unit], optional
+        Where grids failed whose tips were reached: there they are given up.
+    """
+    made = 0
+    for _ in range(ROUNDS):
+        scratch = new_scratch(mesh)
+        scratch.tried[:] = 1
+        reached = sum(_reach(mesh, scratch, place) for place in find_tips(mesh, front, samples, faults))
+        made += reached
+        if not reached:
+            break
+    return made
+
+
+def find_tips(
+    mesh: WorkingMesh, front: Grid, samples: SurfaceSamples, faults: Sequence[Place] = ()
+) -> list[np.ndarray]:
+    """Return the samples (3,) that lie farthest from the grid around them, the farthest first."""
+    measured = samples.kept.copy()
+    measured[samples.measured :] = False
+    places = samples.surface.mean[measured]
+    local = mesh.length * samples.surface.field[measured]
+    grid = close_net(mesh.net, mesh.source, front)
+    away, nearest = np.empty(len(places)), np.empty(len(places), np.int64)
+    index = triangle_boxes(grid.nodes, grid.triangles, mesh.length, FARTHEST_TIP * float(local.max(initial=0.0)))
+    nearest_triangles(places, index, grid.nodes, grid.triangles, np.arange(len(places)), away, nearest, 0, len(places))
+    off = away / local
+    order = np.argsort(-off, kind="stable")
+    order = order[(off[order] >= TIP) & (off[order] <= FARTHEST_TIP)]
+    given_up = np.reshape(faults, (-1, 3)) - samples.origin
+    tips: list[np.ndarray] = []
+    for place, size in zip(places[order], local[order], strict=True):
+        if len(tips) == MOST_TIPS:
+            break
+        near = [np.linalg.norm(place - tip) < TIPS_APART * size for tip in tips]
+        near += [np.linalg.norm(place - fault) < GIVEN_UP_WITHIN * size for fault in given_up]
+        if not any(near) and not _is_at_boundary(mesh, place, TIP_TO_BOUNDARY * size):
+            tips.append(place)
+    return tips
+
+
+def _is_at_boundary(mesh: WorkingMesh, place: np.ndarray, reach: float) -> bool:
+    """Whether a place lies within some distance of a curve that nodes slide on."""
+    curve, _, distance = nearest_on_curves(mesh.curves, *place.tolist())
+    return bool(curve >= 0 and distance < reach)
+
+
+def _reach(mesh: WorkingMesh, scratch: Scratch, place: np.ndarray) -> bool:
+    """Put a node on a tip in the way that costs the least energy; whether it costs little enough, else all is as before."""
+
+    def energy() -> float:
+        return float(total_energy(mesh.net, mesh.patches, scratch, mesh.length, LENGTH_WEIGHT)[0])
+
+    start, best, least = mesh.copied(), None, energy() + ENERGY_OF_TIP
+    for way in ways_to_place(mesh, place):
+        mesh.restore(start)
+        take_place(mesh, scratch, way, place, around=True)
+        if energy() < least:
+            best, least = mesh.copied(), energy()
+    mesh.restore(start if best is None else best)
+    mesh.fixed[:] = start.fixed
+    return best is not None
