@@ -35,7 +35,7 @@ FULLY_IMPROVED = {"quick": 1, "normal": 1, "best": 3}  # fronts that are improve
 # energy a node of the share of the scan that is missed, of its distance at 95 % [members]
 MISSING_ENERGY, DISTANCE_ENERGY = 4.0, 0.1
 MISSED_MORE = 0.002  # share of the scan that the grid of a longer search may miss beyond that of a shorter one
-TRIALS_OF_TIPS = 3  # times that nodes are put on tips, each without those near the faults of the ones before
+TURNS_OF_TIPS = 5  # times that nodes are put on tips
 POOR_SHAPE = 0.4  # shape quality of its worst triangle below which a grid is poor: more finalists are tried
 FINALIST_BATCHES = 2  # times that finalists are tried
 
@@ -179,30 +179,40 @@ def best_that_passes(
 def reach_tips_of(
     candidate: Candidate, samples: SurfaceSamples, boundary: Boundary, constraints: Constraints, settings: Settings
 ) -> None:
-    """Put nodes on the tips of the scan that a grid misses, as far as it still passes and is better for it.
+    """Put nodes on the tips of the scan that a grid misses, as long as it passes and is better for it.
 
-    Near faults that come of it tips are given up, a few times; each turn gives up those of one more place.
+    Each turn either keeps the nodes on some tips, beside which there may be more, or gives up the tips near a fault that came of them.
     """
     faults: list[Place] = []
-    usual = candidate.mesh.copied()
-    for _ in range(TRIALS_OF_TIPS if settings.method == "default" else 0):
-        before, cost = candidate.grid, candidate.cost
+    for _ in range(TURNS_OF_TIPS if settings.method == "default" else 0):
+        kept, before = candidate.mesh.copied(), candidate.grid
+        fresh: list[Place] = []
         try:
             grid = with_tips(candidate.mesh, candidate.front, samples, constraints, candidate.settings, faults)
             if grid is None:
-                break
+                return
             grid = finish_rings(grid, boundary)
             candidate.grid = certified(grid.replace(settings=settings), samples, boundary, settings)
-            if candidate.cost < cost:
-                return
-            candidate.grid = before
-            break
+            if before is not None and _is_nearer(candidate.grid, before):
+                continue
         except CertificateError as error:
-            candidate.mesh.restore(usual)
-            if error.where is None:
-                break
-            faults.append(error.where)
-    candidate.mesh.restore(usual)
+            found = error.grid.certificate
+            fresh = [
+                fault.where for fault in (found.faults if found else ()) if fault.where and fault.where not in faults
+            ]
+        candidate.mesh.restore(kept)
+        candidate.grid = before
+        if not fresh:
+            return
+        faults += fresh
+
+
+def _is_nearer(grid: Grid, other: Grid) -> bool:
+    """Whether a grid reaches as much of the scan as another and lies nearer to it where it is far."""
+    one, two = grid.certificate, other.certificate
+    if one is None or two is None or one.scan_distance is None or two.scan_distance is None:
+        return False
+    return one.missing <= two.missing and one.scan_distance.p99 < two.scan_distance.p99
 
 
 def chosen(passed: Sequence[Candidate]) -> Grid:

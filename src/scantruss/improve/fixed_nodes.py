@@ -134,7 +134,7 @@ def ways_to_place(mesh: WorkingMesh, place: np.ndarray) -> list[tuple[int, int]]
 def take_place(
     mesh: WorkingMesh, scratch: Scratch, way: tuple[int, int], place: np.ndarray, *, around: bool = False
 ) -> None:
-    """Make a node at a place in one way, and improve the grid; `around`: let only the nodes around it settle."""
+    """Make a node at a place in one way, and improve the grid; `around`: only the nodes around it settle."""
     net = mesh.net
     v, b = way
     if b >= 0:

@@ -145,9 +145,8 @@ def with_tips(
 
     faults : places [scan unit] where such grids failed
     """
-    if not reach_tips(mesh, front, samples, faults):
-        return None
-    return put_down(mesh, front, samples, constraints, settings)
+    reached = reach_tips(mesh, front, samples, faults)
+    return put_down(mesh, front, samples, constraints, settings) if reached else None
 
 
 def put_down(

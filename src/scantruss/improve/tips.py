@@ -24,14 +24,13 @@ if TYPE_CHECKING:
     from ..grid.grid import Grid
     from ..surface.samples import SurfaceSamples
 
-TIP = 0.4  # distance of a tip from the grid, at least [member lengths]
+TIP = 0.36  # distance of a tip from the grid, at least [member lengths]
 FARTHEST_TIP = 1.2  # what is farther away is no tip but a part without a grid [member lengths]
 TIPS_APART = 1.0  # least distance between two tips [member lengths]
 TIP_TO_BOUNDARY = 0.5  # distance from the boundary within which no tip is looked for [member lengths]
 GIVEN_UP_WITHIN = 3.0  # distance from a fault within which tips are given up [member lengths]
 MOST_TIPS = 40  # most tips at a time, the farthest first
-ENERGY_OF_TIP = 1.0  # most energy that a node on a tip may cost
-ROUNDS = 2  # times that tips are looked for: the second may lie beside a first
+ENERGY_OF_TIP = 2.0  # most energy that a node on a tip may cost
 
 
 def reach_tips(mesh: WorkingMesh, front: Grid, samples: SurfaceSamples, faults: Sequence[Place] = ()) -> int:
@@ -46,15 +45,9 @@ def reach_tips(mesh: WorkingMesh, front: Grid, samples: SurfaceSamples, faults: 
     faults : places [scan unit], optional
         Where grids failed whose tips were reached: there they are given up.
     """
-    made = 0
-    for _ in range(ROUNDS):
-        scratch = new_scratch(mesh)
-        scratch.tried[:] = 1
-        reached = sum(_reach(mesh, scratch, place) for place in find_tips(mesh, front, samples, faults))
-        made += reached
-        if not reached:
-            break
-    return made
+    scratch = new_scratch(mesh)
+    scratch.tried[:] = 1
+    return sum(_reach(mesh, scratch, place) for place in find_tips(mesh, front, samples, faults))
 
 
 def find_tips(

@@ -120,6 +120,7 @@ class Kept(NamedTuple):
     net: Net
     patches: np.ndarray  #: (C, PATCH_COLUMNS)
     fixed: np.ndarray  #: (C,) bool
+    projection_distance: np.ndarray  #: (C,)
 
 
 @dataclass(frozen=True, eq=False)
@@ -256,13 +257,13 @@ class WorkingMesh:
 
     def copied(self) -> Kept:
         """A copy of what trials change."""
-        return Kept(Net(*(array.copy() for array in self.net)), self.patches.copy(), self.fixed.copy())
+        net = Net(*(array.copy() for array in self.net))
+        return Kept(net, self.patches.copy(), self.fixed.copy(), self.projection_distance.copy())
 
     def restore(self, kept: Kept) -> None:
         """Put the mesh back to a copy."""
-        for array, value in zip(
-            (*self.net, self.patches, self.fixed), (*kept.net, kept.patches, kept.fixed), strict=True
-        ):
+        own = *self.net, self.patches, self.fixed, self.projection_distance
+        for array, value in zip(own, (*kept.net, *kept[1:]), strict=True):
             array[:] = value
 
     def close(self, grid: Grid) -> Closed:
