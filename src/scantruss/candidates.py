@@ -32,7 +32,7 @@ Job = TypeVar("Job")
 Result = TypeVar("Result")
 
 FULLY_IMPROVED = {"quick": 1, "normal": 1, "best": 3}  # fronts that are improved to the end
-# energy a node of the share of the scan that is missed, of its distance at 95 % [members]
+# energy a node of the share of the scan that is missed, of its distance at 95 or 99 % [members]
 MISSING_ENERGY, DISTANCE_ENERGY = 4.0, 0.1
 MISSED_MORE = 0.002  # share of the scan that the grid of a longer search may miss beyond that of a shorter one
 TURNS_OF_TIPS = 5  # times that nodes are put on tips
@@ -58,14 +58,19 @@ class Candidate:
     @property
     def cost(self) -> float:
         """The energy for a node, and what the grid misses of the scan."""
+        return self._cost("p95")
+
+    @property
+    def cost_of_tips(self) -> float:
+        """The same where tips count, which are no more than a few hundredths of a scan."""
+        return self._cost("p99")
+
+    def _cost(self, quantile: str) -> float:
         found = self.grid.certificate if self.grid is not None else None
         if found is None or found.scan_distance is None:
             return self.energy
-        return (
-            self.energy
-            + MISSING_ENERGY * found.missing
-            + DISTANCE_ENERGY * found.scan_distance.p95 / self.settings.length
-        )
+        distance = getattr(found.scan_distance, quantile) / self.settings.length
+        return self.energy + MISSING_ENERGY * found.missing + DISTANCE_ENERGY * float(distance)
 
     @property
     def is_poor(self) -> bool:
@@ -185,7 +190,7 @@ def reach_tips_of(
     """
     faults: list[Place] = []
     for _ in range(TURNS_OF_TIPS if settings.method == "default" else 0):
-        kept, before = candidate.mesh.copied(), candidate.grid
+        kept, before, cost = candidate.mesh.copied(), candidate.grid, candidate.cost_of_tips
         fresh: list[Place] = []
         try:
             grid = with_tips(candidate.mesh, candidate.front, samples, constraints, candidate.settings, faults)
@@ -193,7 +198,7 @@ def reach_tips_of(
                 return
             grid = finish_rings(grid, boundary)
             candidate.grid = certified(grid.replace(settings=settings), samples, boundary, settings)
-            if before is not None and _is_nearer(candidate.grid, before):
+            if candidate.cost_of_tips < cost:
                 continue
         except CertificateError as error:
             found = error.grid.certificate
@@ -205,14 +210,6 @@ def reach_tips_of(
         if not fresh:
             return
         faults += fresh
-
-
-def _is_nearer(grid: Grid, other: Grid) -> bool:
-    """Whether a grid reaches as much of the scan as another and lies nearer to it where it is far."""
-    one, two = grid.certificate, other.certificate
-    if one is None or two is None or one.scan_distance is None or two.scan_distance is None:
-        return False
-    return one.missing <= two.missing and one.scan_distance.p99 < two.scan_distance.p99
 
 
 def chosen(passed: Sequence[Candidate]) -> Grid:

@@ -18,8 +18,8 @@ from .working_mesh import WorkingMesh
 # distance from the boundary up to which a fixed node becomes a boundary node [member lengths]
 BOUNDARY_NODE_REACH = 0.33
 SAME_PLACE = 1e-6  # distance up to which a node is already at a position [member lengths]
-SEARCHED_RINGS = 2  # rings around a fixed node in which moves are tried
-SETTLED_RINGS = 5  # rings around it that settle where only these do
+RINGS_SEARCHED = 2  # rings around a fixed node in which moves are tried
+RINGS_SETTLED = 5  # rings around it that settle where only these do
 NEAREST_TRIED = 3  # number of the nearest nodes, and of the nearest edges, that are tried for a fixed node
 
 
@@ -143,10 +143,10 @@ def take_place(
         mesh.patches[v, NEAREST_SAMPLE] = nearest_sample(mesh.surface, *place.tolist())
         net.ideal[v] = 4 if net.is_open[v] else 6
     _put_node(mesh, v, place)
-    scratch.tried[nodes_around(net, v, SEARCHED_RINGS)] = 0
+    scratch.tried[nodes_around(net, v, RINGS_SEARCHED)] = 0
     for _ in range(3):
         mesh.renew(FARTHEST_ON_THE_WAY)
-        settle(mesh, LENGTH_WEIGHT, 1e-3, 6, independent_sets=[nodes_around(net, v, SETTLED_RINGS)] if around else None)
+        settle(mesh, LENGTH_WEIGHT, 1e-3, 6, independent_sets=[nodes_around(net, v, RINGS_SETTLED)] if around else None)
         if search_once(mesh, scratch) == 0:
             break
 

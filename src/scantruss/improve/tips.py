@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from ..grid.grid import Grid
     from ..surface.samples import SurfaceSamples
 
-TIP = 0.36  # distance of a tip from the grid, at least [member lengths]
+LEAST_TIP = 0.36  # distance of a tip from the grid, at least [member lengths]
 FARTHEST_TIP = 1.2  # what is farther away is no tip but a part without a grid [member lengths]
 TIPS_APART = 1.0  # least distance between two tips [member lengths]
 TIP_TO_BOUNDARY = 0.5  # distance from the boundary within which no tip is looked for [member lengths]
@@ -64,7 +64,7 @@ def find_tips(
     nearest_triangles(places, index, grid.nodes, grid.triangles, np.arange(len(places)), away, nearest, 0, len(places))
     off = away / local
     order = np.argsort(-off, kind="stable")
-    order = order[(off[order] >= TIP) & (off[order] <= FARTHEST_TIP)]
+    order = order[(off[order] >= LEAST_TIP) & (off[order] <= FARTHEST_TIP)]
     given_up = np.reshape(faults, (-1, 3)) - samples.origin
     tips: list[np.ndarray] = []
     for place, size in zip(places[order], local[order], strict=True):
