@@ -40,6 +40,7 @@ FALSE_FOLDS_OF_ROUGH = (
 )
 MOST_FALSE_FOLDS = 80  # such places in a row after which the search stops
 LEAST_ROUGH_RIDGE = 6.0  # least length of a line of folds on a rough scan [member lengths]
+ROUGH_SHARE = 1.4  # share of the ridge angle by which half of such a line is folded at least
 MISSED_PLACES = 2  # places in a row at which a fold may not be seen and still goes on
 LEAST_TURN_COSINE = 0.94  # least cosine of the turn of a fold from place to place
 PLACES_OF_SHORTEST_RING = 6  # places along the shortest ring
@@ -126,8 +127,8 @@ class Tracer:
             ):
                 folds = self._follow(sample, fold, [ridge[:, :3] for ridge in ridges])
                 self.watch.note(len(folds), folds[-1, :3] + self.origin)
-                least = LEAST_ROUGH_RIDGE if rough else SHORTEST_LINE_OF_FOLDS
-                even = [part for part in parts_of(folds) if is_even(part, WEAK_FOLD * self.angle, self.sharpest, least)]
+                even = [part for part in parts_of(folds) if is_even(part, WEAK_FOLD * self.angle, self.sharpest)]
+                even = [part for part in even if not rough or is_clear_on_rough(part, self.angle)]
                 ridges += even
                 misses = 0 if even else misses
                 for place in folds[:, :3]:
@@ -280,12 +281,15 @@ def parts_of(folds: np.ndarray) -> list[np.ndarray]:
     return [*parts, folds[first:]]
 
 
-def is_even(
-    folds: np.ndarray, angle: float, sharpest: float = SHARPEST_FOLD_ANGLE, least: float = SHORTEST_LINE_OF_FOLDS
-) -> bool:
+def is_clear_on_rough(folds: np.ndarray, angle: float) -> bool:
+    """Whether an even line of folds (K, FOUND) is so long and sharp that it is a ridge even where many other places look folded."""
+    return len(folds) * FOLD_STRIDE >= LEAST_ROUGH_RIDGE and float(np.median(folds[:, BEND])) >= ROUGH_SHARE * angle
+
+
+def is_even(folds: np.ndarray, angle: float, sharpest: float = SHARPEST_FOLD_ANGLE) -> bool:
     """Whether a line of folds (K, FOUND), a stride apart, has an angle and is as even as a ridge: what bends evenly is."""
     angles = folds[:, BEND]
-    if len(folds) * FOLD_STRIDE < least or (angles >= angle).sum() * FOLD_STRIDE < LEAST_FULL_LENGTH:
+    if len(folds) * FOLD_STRIDE < SHORTEST_LINE_OF_FOLDS or (angles >= angle).sum() * FOLD_STRIDE < LEAST_FULL_LENGTH:
         return False
     ahead = np.diff(folds[:, :3], axis=0)
     ahead /= np.maximum(np.linalg.norm(ahead, axis=1), 1e-300)[:, None]
