@@ -1,0 +1,110 @@
+"""Tips: what sticks out of a grid about a member thick, as an ear does, gets a node on its end; what has no tip stays as it is."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from marks import compiled_only
+from steps import steps_of
+from surfaces import distance_to_triangles
+from typed import known
+
+import scantruss as st
+from scantruss import candidates
+from scantruss.errors import Place
+from scantruss.front.advance import advance_front
+from scantruss.front.orientation_field import orientation_fields
+from scantruss.improve.optimize import improve_first, improve_last
+from scantruss.improve.tips import FARTHEST_TIP, LEAST_TIP, TIPS_APART, find_tips, reach_tips
+from scantruss.improve.working_mesh import WorkingMesh
+from scantruss.surface.samples import SurfaceSamples
+
+BALL = 3.5  # radius [member]
+EAR, EAR_AT = (
+    np.array([2.2, 0.5, 1.6]),
+    np.array([3.3, 0.0, 0.0]),
+)  # semi-axes and middle of a flat ear on the ball [member]
+
+
+def on_ball(count: int, rng: np.random.Generator) -> np.ndarray:
+    away = rng.normal(size=(count, 3))
+    return np.asarray(away / np.linalg.norm(away, axis=1)[:, None])
+
+
+def eared_ball(seed: int = 0) -> np.ndarray:
+    """Points of a ball with a flat ear, one member thick, that stands out by two."""
+    rng = np.random.default_rng(seed)
+    ball, ear = BALL * on_ball(9000, rng), EAR_AT + EAR * on_ball(4000, rng)
+    outside = (((ball - EAR_AT) / EAR) ** 2).sum(axis=1) > 1.0
+    return np.concatenate([ball[outside], ear[np.linalg.norm(ear, axis=1) > BALL]])
+
+
+def improved(points: np.ndarray) -> tuple[WorkingMesh, st.Grid, SurfaceSamples]:
+    """An improved grid, not yet led to its tips, what its front left, and the samples."""
+    settings = st.Settings(length=1.0)
+    steps = steps_of(st.PointCloud.from_array(points), settings)
+    field = orientation_fields(steps.samples, steps.boundary, settings)[0]
+    front = advance_front(*steps, settings, field.nodes)
+    mesh = improve_first(front, *steps, settings)
+    improve_last(mesh, front, steps.samples, steps.constraints, settings)
+    return mesh, front, steps.samples
+
+
+def naive_distances(places: np.ndarray, grid: st.Grid) -> np.ndarray:
+    """Distance of each place from the nearest of all triangles."""
+    a, b, c = (grid.nodes[grid.triangles[:, k]] for k in range(3))
+    return np.array([distance_to_triangles(np.tile(place, (len(a), 1)), a, b, c).min() for place in places])
+
+
+@compiled_only
+def test_tips_are_the_farthest_places() -> None:
+    mesh, front, samples = improved(eared_ball())
+    tips = np.array(find_tips(mesh, front, samples))
+    places = samples.surface.mean[: samples.measured]
+    off = naive_distances(places, mesh.close(front)[0])
+    assert len(tips) > 0
+    of_tips = naive_distances(tips, mesh.close(front)[0])
+    assert (np.diff(of_tips) <= 1e-12).all()
+    assert of_tips[0] == pytest.approx(off[off <= FARTHEST_TIP].max())
+    far = places[(off >= LEAST_TIP) & (off <= FARTHEST_TIP)]
+    assert np.linalg.norm(far[:, None] - tips, axis=2).min(axis=1).max() < TIPS_APART
+    apart = np.linalg.norm(tips[:, None] - tips, axis=2)[np.triu_indices(len(tips), 1)]
+    assert (apart >= TIPS_APART).all()
+    where: list[Place] = [(float(x), float(y), float(z)) for x, y, z in tips + samples.origin]
+    assert find_tips(mesh, front, samples, where) == []
+
+
+@compiled_only
+def test_a_node_is_put_on_each_tip_that_is_reached() -> None:
+    mesh, front, samples = improved(eared_ball())
+    tips, fixed = find_tips(mesh, front, samples), mesh.fixed.copy()
+    reached = reach_tips(mesh, front, samples)
+    nodes = mesh.net.nodes[mesh.net.degree > 0]
+    on_tip = [np.linalg.norm(nodes - tip, axis=1).min() < 1e-9 for tip in tips]
+    assert sum(on_tip) == reached > 0
+    assert (mesh.fixed == fixed).all()  # a tip is no support
+
+
+@compiled_only
+@pytest.mark.parametrize("seed", range(2))
+def test_a_grid_reaches_the_end_of_an_ear(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    points, settings = eared_ball(seed), st.Settings(length=1.0)
+    grid = st.grid_from_points(points, settings)
+    monkeypatch.setattr(candidates, "TURNS_OF_TIPS", 0)
+    without = st.grid_from_points(points, settings)
+    one, other = known(grid.certificate), known(without.certificate)
+    ear = points[points[:, 0] > BALL + 0.5] - grid.origin
+    assert naive_distances(ear, grid).max() < 0.5 < naive_distances(ear, without).max()
+    assert known(one.scan_distance).p99 < known(other.scan_distance).p99
+    assert one.missing <= other.missing
+    assert grid.quality.shape_mean > 0.97
+
+
+@compiled_only
+def test_a_ball_has_no_tips(monkeypatch: pytest.MonkeyPatch) -> None:
+    points, settings = BALL * on_ball(6000, np.random.default_rng(3)), st.Settings(length=1.0)
+    grid = st.grid_from_points(points, settings)
+    monkeypatch.setattr(candidates, "TURNS_OF_TIPS", 0)
+    without = st.grid_from_points(points, settings)
+    assert (grid.nodes == without.nodes).all()
+    assert (grid.triangles == without.triangles).all()
