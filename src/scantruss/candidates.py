@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, TypeVar
 
-from .check.certify import certified
-from .errors import CertificateError, FrontError, Place
+from .check.certify import checked, passed_grid
+from .errors import FrontError, Place
 from .front.advance import advance_front
 from .front.orientation_field import Field, orientation_fields
 from .improve.equalize import energy_of_node
@@ -36,6 +36,7 @@ FULLY_IMPROVED = {"quick": 1, "normal": 1, "best": 3}  # fronts that are improve
 MISSING_ENERGY, DISTANCE_ENERGY = 4.0, 0.1
 MISSED_MORE = 0.002  # share of the scan that the grid of a longer search may miss beyond that of a shorter one
 TURNS_OF_TIPS = 5  # times that nodes are put on tips
+MOST_MISSED = 0.2  # largest share of the scan that a grid may miss where they are put on tips
 POOR_SHAPE = 0.4  # shape quality of its worst triangle below which a grid is poor: more finalists are tried
 FINALIST_BATCHES = 2  # times that finalists are tried
 
@@ -159,10 +160,12 @@ def best_that_passes(
         try:
             grid = improve_last(candidate.mesh, candidate.front, samples, constraints, candidate.settings)
             grid = finish_rings(grid, boundary)
-            candidate.grid = certified(grid.replace(settings=settings), samples, boundary, settings)
-            reach_tips_of(candidate, samples, boundary, constraints, settings)
+            candidate.grid = checked(grid.replace(settings=settings), samples, boundary, settings)
+            if misses_at_most(candidate.grid, MOST_MISSED):
+                reach_tips_of(candidate, samples, boundary, constraints, settings)
+            candidate.grid = passed_grid(candidate.grid)
         except FrontError as error:
-            candidate.fault = error
+            candidate.grid, candidate.fault = None, error
 
     passed: list[Candidate] = []
     size = FULLY_IMPROVED[settings.effort]
@@ -181,30 +184,31 @@ def best_that_passes(
     return chosen(passed)
 
 
+def misses_at_most(grid: Grid, share: float) -> bool:
+    """Whether nothing is wrong with a grid but that it misses some share of the scan at most."""
+    found = grid.certificate
+    return found is not None and found.missing <= share and all(fault.kind == "cover" for fault in found.faults)
+
+
 def reach_tips_of(
     candidate: Candidate, samples: SurfaceSamples, boundary: Boundary, constraints: Constraints, settings: Settings
 ) -> None:
-    """Put nodes on the tips of the scan that a grid misses, as long as it passes and is better for it.
+    """Put nodes on the tips of the scan that a grid misses, as long as it is better for it and nothing else goes wrong.
 
     Each turn either keeps the nodes on some tips, beside which there may be more, or gives up the tips near a fault that came of them.
     """
     faults: list[Place] = []
     for _ in range(TURNS_OF_TIPS if settings.method == "default" else 0):
         kept, before, cost = candidate.mesh.copied(), candidate.grid, candidate.cost_of_tips
-        fresh: list[Place] = []
-        try:
-            grid = with_tips(candidate.mesh, candidate.front, samples, constraints, candidate.settings, faults)
-            if grid is None:
-                return
-            grid = finish_rings(grid, boundary)
-            candidate.grid = certified(grid.replace(settings=settings), samples, boundary, settings)
-            if candidate.cost_of_tips < cost:
-                continue
-        except CertificateError as error:
-            found = error.grid.certificate
-            fresh = [
-                fault.where for fault in (found.faults if found else ()) if fault.where and fault.where not in faults
-            ]
+        grid = with_tips(candidate.mesh, candidate.front, samples, constraints, candidate.settings, faults)
+        if grid is None:
+            return
+        grid = finish_rings(grid, boundary).replace(settings=settings)
+        candidate.grid = checked(grid, samples, boundary, settings)
+        if misses_at_most(candidate.grid, MOST_MISSED) and candidate.cost_of_tips < cost:
+            continue
+        found = candidate.grid.certificate
+        fresh = [fault.where for fault in (found.faults if found else ()) if fault.where and fault.where not in faults]
         candidate.mesh.restore(kept)
         candidate.grid = before
         if not fresh:

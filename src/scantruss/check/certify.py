@@ -82,17 +82,26 @@ def certify(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings: S
     return replace(certificate, faults=tuple(faults), warnings=warnings, widened=widened_limits(settings))
 
 
+def checked(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings: Settings) -> Grid:
+    """Return the grid with its certificate, whether it passes or not."""
+    return grid.replace(certificate=certify(grid, samples, boundary, settings))
+
+
 def certified(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings: Settings) -> Grid:
-    """Return the grid with its certificate: rather no result than a wrong one that looks right.
+    """Return the grid with its certificate: rather no result than a wrong one that looks right; see `passed_grid`."""
+    return passed_grid(checked(grid, samples, boundary, settings))
+
+
+def passed_grid(grid: Grid) -> Grid:
+    """Return a grid whose certificate passes.
 
     Raises
     ------
     CertificateError
-        The grid does not pass. Names the first place of a fault.
+        It does not pass. Names the first place of a fault.
     """
-    certificate = certify(grid, samples, boundary, settings)
-    grid = grid.replace(certificate=certificate)
-    if certificate.passed:
+    certificate = grid.certificate
+    if certificate is None or certificate.passed:
         return grid
     words = _listed([fault.words for fault in certificate.faults[:FAULTS_NAMED]])
     more = len(certificate.faults) - FAULTS_NAMED
