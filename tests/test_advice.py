@@ -97,7 +97,7 @@ def test_a_refused_length_comes_with_one_that_passes(
     place: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Where the grid of one length fails, another is named that was tried."""
-    from scantruss.check.certify import certified
+    from scantruss.check.certify import checked
     from scantruss.scan.member_length import suggest_length
 
     failing = suggest_length(st.read_points("limpet.xyz"))
@@ -105,9 +105,9 @@ def test_a_refused_length_comes_with_one_that_passes(
     def fails_there(grid: st.Grid, samples: SurfaceSamples, boundary: st.Boundary, settings: st.Settings) -> st.Grid:
         if abs(settings.length - failing) < 0.01 * failing:
             raise st.FrontError("the front cannot close")
-        return certified(grid, samples, boundary, settings)
+        return checked(grid, samples, boundary, settings)
 
-    monkeypatch.setattr("scantruss.candidates.certified", fails_there)
+    monkeypatch.setattr("scantruss.candidates.checked", fails_there)
     words = ["grid", "limpet.xyz", "a.json", "--effort", "quick", "--length"]
     assert main([*words, str(failing)]) == 2
     said = capsys.readouterr().err

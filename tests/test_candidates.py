@@ -241,7 +241,7 @@ def test_fronts_that_fail_their_check_are_left_out_and_the_fault_of_the_best_is_
         return grid
 
     monkeypatch.setattr(candidates, "processors", lambda: 1)
-    monkeypatch.setattr(candidates, "certified", check)
+    monkeypatch.setattr(candidates, "checked", check)
     grid = st.optimize_fronts(fronts, *steps, settings)
     assert len(refused) == 3 and grid.topology.manifold
 
@@ -250,7 +250,7 @@ def test_fronts_that_fail_their_check_are_left_out_and_the_fault_of_the_best_is_
         raise FrontError(f"fault {len(refused)}")
 
     refused.clear()
-    monkeypatch.setattr(candidates, "certified", never)
+    monkeypatch.setattr(candidates, "checked", never)
     with pytest.raises(FrontError, match="fault 1"):
         st.optimize_fronts(fronts, *steps, settings)
 

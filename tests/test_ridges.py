@@ -13,7 +13,7 @@ from steps import steps_of
 from typed import known
 
 from scantruss import Grid, PointCloud, Settings, candidates, grid_from_points
-from scantruss.check.certify import certified
+from scantruss.check.certify import checked
 from scantruss.constraints.fold_tracing import Tracer, is_even, parts_of
 from scantruss.constraints.ridge_ends import Ridge, join_ends
 from scantruss.constraints.ridges import find_ridges
@@ -134,9 +134,9 @@ def test_a_grid_that_fails_with_its_ridges_is_made_without(monkeypatch: pytest.M
     def refuse_lines(grid: Grid, *others: Any) -> Grid:
         if len(grid.lines):
             raise FrontError("no", grid)
-        return certified(grid, *others)
+        return checked(grid, *others)
 
-    monkeypatch.setattr(candidates, "certified", refuse_lines)
+    monkeypatch.setattr(candidates, "checked", refuse_lines)
     grid = grid_from_points(shape.points, Settings(length=shape.length))
     assert len(grid.lines) == 0 and known(grid.settings).ridge_angle == 0.0
 
