@@ -9,6 +9,7 @@ from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import SuperLU
 
 from ..errors import InputError
+from ..kernels.geometry.components import component_labels
 from .truss import Truss
 
 MOST_NAMED = 4  #: nodes of a mechanism that are named
@@ -53,6 +54,13 @@ def refuse_mechanism(truss: Truss, motion: np.ndarray) -> NoReturn:
     alone = np.setdiff1d(np.arange(len(truss.nodes)), truss.members)
     if len(alone):
         raise InputError(f"a mechanism: no member holds the node {truss.node_marks[alone[0]]}; remove it from the grid")
+    piece = component_labels(len(truss.nodes), *truss.members.T)
+    loose = np.setdiff1d(piece, piece[truss.supports.any(axis=1)])
+    if len(loose):
+        more = int((piece == loose[0]).sum()) - 1
+        raise InputError(
+            f"a mechanism: the piece of the node {truss.node_marks[loose[0]]} and {more:,} more has no support; hold it too"
+        )
     length = float(np.median(truss.lengths))
     moves = np.linalg.norm(motion[:, :3], axis=1)
     turns = length * np.linalg.norm(motion[:, 3:], axis=1)

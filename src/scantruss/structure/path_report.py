@@ -52,9 +52,9 @@ def path_warnings(path: Path) -> list[str]:
     """Return what is to be known about a path."""
     said = []
     if path.kind == "bifurcation":
+        advice = "a larger imperfection" if path.imperfection.kind == "mode" else "an imperfection, such as mode"
         said.append(
-            f"the path passes a bifurcation at the factor {path.limit_factor:.4g}: the structure leaves it there; take an"
-            " imperfection, such as mode"
+            f"the path passes a bifurcation at the factor {path.limit_factor:.4g}: the structure leaves it there; take {advice}"
         )
     if path.limit_factor is not None and path.limit_factor < 1:
         said.append(
