@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NoReturn
 
 import numpy as np
@@ -28,13 +29,18 @@ def softest_motion(stiffness: csc_matrix, factor: SuperLU) -> tuple[float, np.nd
     """
     motion = np.random.default_rng(1).standard_normal(stiffness.shape[0])
     for _ in range(INVERSE_STEPS):
-        motion /= np.linalg.norm(motion)
+        motion /= math.sqrt(product(motion, motion))
         found = factor.solve(motion)
         if not np.isfinite(found).all() or not found.any():
             break
         motion = found
-    motion /= np.linalg.norm(motion)
-    return float(motion @ (stiffness @ motion)), motion
+    motion /= math.sqrt(product(motion, motion))
+    return product(motion, stiffness @ motion), motion
+
+
+def product(one: np.ndarray, other: np.ndarray) -> float:
+    """Return the scalar product of two long vectors; BLAS would wake threads for it, which wait for each other on a busy machine."""
+    return float((one * other).sum())
 
 
 def refuse_mechanism(truss: Truss, motion: np.ndarray) -> NoReturn:
