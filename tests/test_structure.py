@@ -379,6 +379,26 @@ def test_many_freedoms_have_the_modes_of_few() -> None:
     assert sparse[0] == pytest.approx(dense[0], rel=1e-6) and sparse[1] == pytest.approx(dense[1], rel=1e-6)
 
 
+def test_modes_are_the_same_wherever_they_are_looked_for() -> None:
+    """A shift beyond the first mode is found out by its pivots and taken back; none that helps is no harm."""
+    truss = Truss.from_grid(dome(7, 40.0), scale=50, supports="boundary", loads="snow:1kN/m2")
+    factored = factor_stiffness(truss)
+    snow = solve(truss, factored)["snow"]
+    usual = buckling_modes(factored, snow, 3).values
+    for shifts in ((1.3, 0.8), (1.3,), ()):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(modes_module, "MODE_SHIFTS", shifts)
+            assert buckling_modes(factored, snow, 3).values == pytest.approx(usual, rel=1e-8)
+
+
+def test_a_large_structure_that_is_only_pulled_does_not_buckle() -> None:
+    """A chain that hangs, of more displacements than are solved at once."""
+    nodes, members = line_of(40.0, 60, (0, 0, -1))
+    truss = make_truss(nodes, members, {0: HELD}, forces(61, {60: (0, 0, -1000.0)}))
+    factored = factor_stiffness(truss)
+    assert len(buckling_modes(factored, solve(truss, factored)["load"], 2).values) == 0
+
+
 def test_hinged_members_of_a_frame_stay_straight_when_it_buckles() -> None:
     """By hand: a column on a hinge, held at its top by a spring k sideways, falls over at k L."""
     springs = (1e4, 1e4, 0.0, 0.0, 0.0, np.inf)

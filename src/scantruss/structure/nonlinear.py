@@ -231,7 +231,10 @@ class _Walk:
             if there.tangent.negative == 0 and there.state.factor >= self.end:
                 there = self._at_factor(here, taken, there)
             elif self.critical is None and there.tangent.negative:
-                self._find_critical(here, self.back, self.arc, there, taken)
+                state, known = there.state, (there.tangent.smallest, there.state.factor, self._falls(there, taken))
+                del there  # lets go of its tangent
+                self._find_critical(here, self.back, self.arc, known)
+                there = self._place(state)
             self._keep(there)
             if self.progress is not None:
                 self.progress("path", self.done / self.steps)
@@ -348,11 +351,14 @@ class _Walk:
         found = self._step(here, taken, 0.0, self.end)
         return there if found is None or found[0].tangent.negative else found[0]
 
-    def _find_critical(self, here: _Place, back: np.ndarray, arc: float, there: _Place, taken: np.ndarray) -> None:
-        """Keep the last stable state between two, where the smallest eigenvalue of the tangent is nil: regula falsi (Illinois)."""
+    def _find_critical(self, here: _Place, back: np.ndarray, arc: float, known: tuple[float, float, bool]) -> None:
+        """Keep the last stable state before an arc length, where the smallest eigenvalue of the tangent is nil: regula falsi (Illinois).
+
+        Known of the state there are that eigenvalue, the load factor, and whether the load falls.
+        """
         low, high = 0.0, arc
         value = start = here.tangent.smallest
-        beyond, beyond_factor, falls = there.tangent.smallest, there.state.factor, self._falls(there, taken)
+        beyond, beyond_factor, falls = known
         last: tuple[LoadedState, int, float] | None = None  # without its tangent, which takes much memory
         last_factor = here.state.factor
         kept: bool | None = None
