@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.sparse import csc_matrix
+from scipy.sparse.linalg import splu
 from shapes import make
 from small_grids import dome, fan
 from small_trusses import (
@@ -28,9 +30,10 @@ from small_trusses import (
 import scantruss as st
 from scantruss.grid.grid import Grid
 from scantruss.structure import modes as modes_module
+from scantruss.structure.mechanism import pivots
 from scantruss.structure.modes import buckling_modes, vibration_modes, worst_buckling
 from scantruss.structure.report import report_structure
-from scantruss.structure.statics import factor_stiffness, solve
+from scantruss.structure.statics import IN_ORDER, factor_stiffness, solve
 from scantruss.structure.truss import LoadCase, Truss
 
 FOUR_DIGITS = 5e-5
@@ -389,6 +392,16 @@ def test_modes_are_the_same_wherever_they_are_looked_for() -> None:
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(modes_module, "MODE_SHIFTS", shifts)
             assert buckling_modes(factored, snow, 3).values == pytest.approx(usual, rel=1e-8)
+
+
+def test_pivots_leave_a_factor_as_it_was_and_no_copy_of_it() -> None:
+    matrix = csc_matrix(np.diag([4.0, -3.0, 2.0, 5.0]) + np.eye(4, k=1) + np.eye(4, k=-1))
+    factor = splu(matrix, **IN_ORDER)
+    found = pivots(factor)
+    assert (found < 0).sum() == (np.linalg.eigvalsh(matrix.toarray()) < 0).sum() == 1
+    assert found.prod() == pytest.approx(np.linalg.det(matrix.toarray()))
+    assert factor.U.nnz == factor.L.nnz == 0
+    assert matrix @ factor.solve(np.ones(4)) == pytest.approx(np.ones(4))
 
 
 def test_a_large_structure_that_is_only_pulled_does_not_buckle() -> None:

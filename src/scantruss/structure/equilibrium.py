@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from .corotational import Answer, Members, Response, answer, respond
 from .frame import freedoms, member_freedoms
-from .mechanism import softest_motion
+from .mechanism import pivots, softest_motion
 from .statics import IN_ORDER, SINGULAR, Factored, dead_loads
 from .truss import LoadCase
 
@@ -43,7 +43,7 @@ class Tangent:
     @cached_property
     def negative(self) -> int:
         """Negative pivots: as many as ways in which the state is not stable."""
-        return int((self.lu.U.diagonal() < 0).sum())
+        return int((pivots(self.lu) < 0).sum())
 
     def solve(self, loads: np.ndarray) -> np.ndarray:
         """Return the (F,) or (F, C) displacements of loads."""

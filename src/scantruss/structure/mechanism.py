@@ -38,6 +38,19 @@ def softest_motion(stiffness: csc_matrix, factor: SuperLU) -> tuple[float, np.nd
     return product(motion, stiffness @ motion), motion
 
 
+def pivots(factor: SuperLU) -> np.ndarray:
+    """Return the pivots of a factored matrix (F,); to be asked once of each.
+
+    They stand in copies of both factors which SuperLU makes when it is asked and keeps as long as it lives, as large as itself: so the
+    copies are emptied.
+    """
+    found: np.ndarray = factor.U.diagonal()
+    for copy in (factor.L, factor.U):
+        copy.data, copy.indices = copy.data[:0].copy(), copy.indices[:0].copy()
+        copy.indptr = np.zeros_like(copy.indptr)
+    return found
+
+
 def product(one: np.ndarray, other: np.ndarray) -> float:
     """Return the scalar product of two long vectors; BLAS would wake threads for it, which wait for each other on a busy machine."""
     return float((one * other).sum())

@@ -17,14 +17,18 @@ from scipy.sparse.linalg import LinearOperator, SuperLU, eigsh, splu
 
 from ..errors import InputError
 from .frame import BEND_Y1, BEND_Z1, BOW, LENGTHEN, assemble, freedoms, inner_turns, member_freedoms, transforms
-from .mechanism import product
+from .mechanism import pivots, product
 from .statics import IN_ORDER, CaseResult, Factored, Solution
 from .truss import GRAVITY, Truss
 
 FEW_FREEDOMS = 200  #: up to which all modes are found at once by dense matrices
 SEVERAL_LEADING = 3  #: combinations of which buckling is looked at, with different leading actions
 ROUGH = 1e-2  #: relative error of the first estimate
-MODE_SHIFTS = (0.97, 0.8, 0.5)  #: shares of the first value about which the others are looked for, until none lies before
+MODE_SHIFTS = (
+    0.97,
+    0.8,
+    0.5,
+)  #: shares of the first value about which the others are looked for, until none lies before
 NEGLIGIBLE = 1e-9  #: share of the largest eigenvalue below which one is nil
 
 
@@ -141,7 +145,7 @@ def _of_many(part: csc_matrix, stiff: csc_matrix, factor: SuperLU, count: int) -
             moved = splu((stiff - shift * part).tocsc(), **IN_ORDER)
         except RuntimeError:  # an eigenvalue lies there
             continue
-        if (moved.perm_r == moved.perm_c).all() and (moved.U.diagonal() > 0).all():  # none lies before
+        if (moved.perm_r == moved.perm_c).all() and (pivots(moved) > 0).all():  # none lies before
             near = LinearOperator(stiff.shape, matvec=moved.solve, dtype=float)
             about = {"sigma": shift, "OPinv": near, "mode": "buckling", "which": "LA", "v0": given["v0"]}
             factors, vectors = eigsh(stiff, k=count, M=part, tol=1e-10, **about)

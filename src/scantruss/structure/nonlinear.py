@@ -321,6 +321,7 @@ class _Walk:
                 fresh, rate, mixture = fresh + 1, FIRST_RATE, Mixture(balance.weights)
                 before_it = here.response if last is here.state else balance.respond(last)
                 response = balance.respond(state, foreseen=balance.foresee(before_it, step), tangents=True)
+                tangent = here.tangent  # lets go of a newer one, which takes much memory
                 tangent = balance.tangent(response)
                 towards = tangent.solve(balance.direction(response))
             step, more = tangent.solve(left[balance.free]), 0.0
