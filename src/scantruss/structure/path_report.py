@@ -9,7 +9,7 @@ from ..runtime.ours import MARK
 from .nonlinear import CUTS, PATH_STEPS, Path
 from .truss import Truss
 
-SECONDS = 4e-5  #: of a step for each displacement of a node, on a usual machine
+SECONDS = 3e-5  #: of a step for each displacement of a node, on a usual machine
 GROWS = 1.2  #: power of the displacements by which this grows
 EXTRA_STEPS = 10  #: that a path needs to find where stability is lost
 
@@ -72,7 +72,7 @@ def path_expectation(truss: Truss, steps: int = PATH_STEPS) -> str:
     time = f"{max(seconds, 1):.0f} s" if seconds < 90 else f"{seconds / 60:.0f} min"
     return (
         f"{len(truss.nodes):,} nodes, {len(truss.members):,} members, {freedoms:,} displacements: a path of {steps} steps takes"
-        f" about {time} on a usual machine, twice that for a mode with both signs, up to {2**CUTS:,} shorter steps where it is hard"
+        f" about {time} on a usual machine, up to twice that for a mode with both signs, up to {2**CUTS:,} shorter steps where it is hard"
     )
 
 
