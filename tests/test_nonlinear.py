@@ -14,8 +14,9 @@ from small_grids import dome
 from small_trusses import EA, EI, HELD, HINGED, STEEL, TUBE, forces, make_truss, stiff_along
 
 import scantruss as st
-from scantruss.structure.corotational import Members, respond
+from scantruss.structure.corotational import FARTHEST_TURN, Members, answer, respond
 from scantruss.structure.imperfections import fair_deviation
+from scantruss.structure.mixture import Mixture
 from scantruss.structure.nonlinear import Path, solve_path
 from scantruss.structure.truss import LoadCase, Truss
 
@@ -270,6 +271,48 @@ def test_tangents_are_the_derivatives_of_forces_and_turn_with_the_structure() ->
     turn = Rotation.from_rotvec([1.0, 2.0, -0.5]).as_matrix()
     turned = respond(members, (nodes + moves) @ turn.T - nodes, turn @ turns, strain, 1.0)
     assert turned.natural == pytest.approx(found.natural, abs=1e-9 * np.abs(found.natural).max())
+
+
+@pytest.mark.kernels
+def test_forces_alone_are_those_with_derivatives() -> None:
+    """The kernel against its twin of arrays, small turns and large ones, hinges and springs at the ends."""
+    rng = np.random.default_rng(1)
+    nodes = rng.normal(size=(8, 3)) * 3
+    springs = np.where(rng.random((12, 2, 2)) < 0.5, np.inf, 3e5)
+    pairs = [(a, b) for a in range(8) for b in range(a)][::2][:12]
+    members = Members.of(make_truss(nodes, pairs, {0: HELD}, end_stiffness=springs))
+    strain = rng.normal(size=12) * 1e-3
+    for size in (0.0, 1e-6, 0.2, 2.0):
+        moves = rng.normal(size=(8, 3)) * 0.1 * size
+        turns = Rotation.from_rotvec(rng.normal(size=(8, 3)) * 0.3 * size).as_matrix()
+        fast, slow = (each(members, moves, turns, strain, 0.7) for each in (answer, respond))
+        most = np.abs(slow.natural).max()
+        assert fast.too_far == slow.too_far == (size > 1) and FARTHEST_TURN == 0.5
+        if not slow.too_far:
+            assert fast.natural == pytest.approx(slow.natural, abs=1e-12 * most)
+            assert fast.forces == pytest.approx(slow.forces, abs=1e-12 * most)
+
+
+def test_mixed_iterations_solve_what_plain_ones_do_not() -> None:
+    """A linear system by a poor inverse: plain iterations grow, mixed ones end when they have seen each of its five eigenvalues."""
+    values = np.repeat([0.4, 0.8, 1.3, 1.9, 2.2], 4)  # of the poor inverse times the matrix
+    goal = np.random.default_rng(0).normal(size=20)
+    plain, mixed, mixture = np.zeros(20), np.zeros(20), Mixture(np.ones(20))
+    for _ in range(7):
+        plain = plain + values * (goal - plain)
+        mixed = mixed + mixture.improved(values * (goal - mixed), 0.0)[0]
+    assert np.abs(plain - goal).max() > 1 and mixed == pytest.approx(goal, abs=1e-6)
+
+
+def test_of_both_signs_of_a_mode_the_lower_limit_counts() -> None:
+    """A path of both signs is that of one of them, the one that loses its stability first."""
+    truss = st.Truss.from_grid(dome(6, 40.0), scale=50, supports="boundary", loads="cladding:1kN/m2")
+    both = solve_path(truss, "cladding", imperfection="mode:30mm")
+    signs = [solve_path(truss, "cladding", imperfection=sign * both.imperfection.moves) for sign in (1.0, -1.0)]
+    limits = [path.limit_factor or math.inf for path in signs]
+    chosen = signs[int(np.argmin(limits))]
+    assert both.limit_factor == min(limits) and both.ended == chosen.ended
+    assert both.factors == pytest.approx(chosen.factors, rel=1e-9)
 
 
 @pytest.mark.parametrize("joints", ["rigid", "pinned", "50000"])

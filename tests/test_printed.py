@@ -158,7 +158,7 @@ def test_marks_are_engraved_outside_and_take_little() -> None:
     plain = build_solid(grid, member_diameter=3.0, node_diameter=9.0, sides=32)
     marked = build_solid(grid, member_diameter=3.0, node_diameter=9.0, sides=32, marks=True)
     assert is_watertight(marked.triangles) and marked.genus == plain.genus and marked.notes == []
-    taken = (plain.volume - marked.volume) / 16
+    taken = (plain.volume - marked.volume) / (16 + len(grid.edges))
     height = letter_height("N001", 4.5)
     assert 0 < taken < 1.1 * 4.5 * height * 4.5 and 1.0 < height < 3.0
     normals = find_joints(grid).normal
@@ -167,9 +167,19 @@ def test_marks_are_engraved_outside_and_take_little() -> None:
     ]
     near = np.linalg.norm(new[:, None] - grid.nodes, axis=2)
     at = near.argmin(axis=1)
-    assert (near.min(axis=1) < 4.5 + 1e-6).all()
+    on_ball = near.min(axis=1) < 4.5 + 1e-6
     up = ((new - grid.nodes[at]) * normals[at]).sum(axis=1)
-    assert (up > 0).all() and set(at.tolist()) == set(range(16))
+    assert (up[on_ball] > 0).all() and set(at[on_ball].tolist()) == set(range(16))
+    start, end = grid.nodes[grid.edges].transpose(1, 0, 2)
+    way, middle = (end - start) / grid.lengths[:, None], (start + end) / 2
+    out = normals[grid.edges].sum(axis=1)
+    away = new[~on_ball, None] - middle
+    along = (away * way).sum(axis=2)
+    across = np.linalg.norm(away - along[:, :, None] * way, axis=2)
+    across[np.abs(along) > (grid.lengths - 9.0) / 2] = np.inf  # beyond the clear length
+    of = across.argmin(axis=1)
+    assert set(of.tolist()) == set(range(len(grid.edges))) and across.min(axis=1).max() < 1.5 + 1e-6
+    assert ((away[np.arange(len(of)), of] * out[of]).sum(axis=1) > 0).all()
 
 
 @pytest.mark.parametrize("name", ["dome", "closed"])

@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.sparse import csc_matrix
+from scipy.sparse.linalg import splu
 from shapes import make
 from small_grids import dome, fan
 from small_trusses import (
@@ -28,9 +30,10 @@ from small_trusses import (
 import scantruss as st
 from scantruss.grid.grid import Grid
 from scantruss.structure import modes as modes_module
+from scantruss.structure.mechanism import pivots
 from scantruss.structure.modes import buckling_modes, vibration_modes, worst_buckling
 from scantruss.structure.report import report_structure
-from scantruss.structure.statics import factor_stiffness, solve
+from scantruss.structure.statics import IN_ORDER, factor_stiffness, solve
 from scantruss.structure.truss import LoadCase, Truss
 
 FOUR_DIGITS = 5e-5
@@ -377,6 +380,36 @@ def test_many_freedoms_have_the_modes_of_few() -> None:
         patch.setattr(modes_module, "FEW_FREEDOMS", 10**6)
         dense = buckling_modes(factored, snow, 3).values, vibration_modes(factored, 3).values
     assert sparse[0] == pytest.approx(dense[0], rel=1e-6) and sparse[1] == pytest.approx(dense[1], rel=1e-6)
+
+
+def test_modes_are_the_same_wherever_they_are_looked_for() -> None:
+    """A shift beyond the first mode is found out by its pivots and taken back; none that helps is no harm."""
+    truss = Truss.from_grid(dome(7, 40.0), scale=50, supports="boundary", loads="snow:1kN/m2")
+    factored = factor_stiffness(truss)
+    snow = solve(truss, factored)["snow"]
+    usual = buckling_modes(factored, snow, 3).values
+    for shifts in ((1.3, 0.8), (1.3,), ()):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(modes_module, "MODE_SHIFTS", shifts)
+            assert buckling_modes(factored, snow, 3).values == pytest.approx(usual, rel=1e-8)
+
+
+def test_pivots_leave_a_factor_as_it_was_and_no_copy_of_it() -> None:
+    matrix = csc_matrix(np.diag([4.0, -3.0, 2.0, 5.0]) + np.eye(4, k=1) + np.eye(4, k=-1))
+    factor = splu(matrix, **IN_ORDER)
+    found = pivots(factor)
+    assert (found < 0).sum() == (np.linalg.eigvalsh(matrix.toarray()) < 0).sum() == 1
+    assert found.prod() == pytest.approx(np.linalg.det(matrix.toarray()))
+    assert factor.U.nnz == factor.L.nnz == 0
+    assert matrix @ factor.solve(np.ones(4)) == pytest.approx(np.ones(4))
+
+
+def test_a_large_structure_that_is_only_pulled_does_not_buckle() -> None:
+    """A chain that hangs, of more displacements than are solved at once."""
+    nodes, members = line_of(40.0, 60, (0, 0, -1))
+    truss = make_truss(nodes, members, {0: HELD}, forces(61, {60: (0, 0, -1000.0)}))
+    factored = factor_stiffness(truss)
+    assert len(buckling_modes(factored, solve(truss, factored)["load"], 2).values) == 0
 
 
 def test_hinged_members_of_a_frame_stay_straight_when_it_buckles() -> None:

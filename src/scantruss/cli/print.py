@@ -42,7 +42,9 @@ def print_parser() -> Parser:
     parser.add_argument(
         "--scale", metavar="S", type=scale, default=1.0, help="scale of the model, 0.01 or 1:100 (default 1)"
     )
-    parser.add_argument("--marks", action="store_true", help="engrave the marks of the nodes on their balls")
+    parser.add_argument(
+        "--marks", action="store_true", help="engrave the marks of nodes on their balls, of members along them"
+    )
     parser.add_argument(
         "--bed",
         metavar="WxDxH",

@@ -109,7 +109,14 @@ def structure(values: Namespace) -> None:
     from ..structure.doubts import support_words
     from ..structure.modes import vibration_modes, worst_buckling
     from ..structure.path_report import encode_path, path_expectation
-    from ..structure.report import STRUCTURE_HEAD, mode_lines, report_structure, structure_lines, unlisted_lines
+    from ..structure.report import (
+        STRUCTURE_HEAD,
+        half_lines,
+        mode_lines,
+        report_structure,
+        structure_lines,
+        unlisted_lines,
+    )
     from ..structure.sizing import SizingRound, size_members, weight_curve
     from ..structure.statics import factor_stiffness, solve
     from ..structure.truss import Truss
@@ -163,6 +170,7 @@ def structure(values: Namespace) -> None:
     print_lines(
         [
             *unlisted_lines(report),
+            *half_lines(report),
             f"{len(truss.nodes):,} nodes, {len(truss.members):,} members of {names} {truss.material.name},"
             f" {truss.lengths.mean():.3g} m long on average, {truss.mass:,.0f} kg without nodes",
             support_words(truss),

@@ -1,4 +1,4 @@
-"""Marks engraved on the balls of a printed model."""
+"""Marks engraved on the balls and members of a printed model."""
 
 from __future__ import annotations
 
@@ -10,6 +10,9 @@ import numpy as np
 MARK_WIDTH = 1.1  # width of a mark over the radius of its ball
 TALLEST = 0.6  # height of letters over the radius of the ball
 DEPTH = 0.08  # of the engraving where it is least deep, over the radius of the ball
+TALL_ON_MEMBER = 0.9  # greatest height of letters over the radius of the member
+ROOM_TAKEN = 0.8  # greatest share of the clear length that a mark takes
+DEPTH_ON_MEMBER = 0.15  # of the engraving where it is least deep, over the radius of the member
 
 
 @cache
@@ -42,6 +45,34 @@ def engraved(ball: Any, radius: float, text: str, normal: np.ndarray) -> Any:
     x /= np.linalg.norm(x)
     turn = np.stack([x, np.cross(normal, x), normal, np.zeros(3)], axis=1)
     return ball - letters.transform(turn)
+
+
+def engraved_member(
+    bar: Any, radius: float, sides: int, text: str, place: np.ndarray, way: np.ndarray, normal: np.ndarray, room: float
+) -> Any:
+    """Return a member with a text engraved along it.
+
+    Parameters
+    ----------
+    bar : the member, a prism of `sides` sides whose corners lie at `radius`
+    place, way, normal : (3,) place on its axis, unit vector along it, and the side that the text is on
+    room : clear length there; the text takes `ROOM_TAKEN` of it at most
+    """
+    from manifold3d import CrossSection, FillRule, Manifold
+
+    outlines = _letters(text)
+    wide = 2 * max(float(np.abs(each[:, 0]).max()) for each in outlines)
+    height = min(TALL_ON_MEMBER * radius, ROOM_TAKEN * room / wide)
+    if height <= 0:
+        return bar
+    out = normal - (normal @ way) * way
+    if np.linalg.norm(out) < 1e-6:
+        out = np.cross(way, np.eye(3)[np.abs(way).argmin()])
+    out = out / np.linalg.norm(out)
+    floor = float(np.sqrt((radius * np.cos(np.pi / sides)) ** 2 - (height / 2) ** 2)) - DEPTH_ON_MEMBER * radius
+    flat = CrossSection([(each * height).tolist() for each in outlines], FillRule.EvenOdd)
+    letters = Manifold.extrude(flat, 2 * radius - floor).translate((0.0, 0.0, floor))
+    return bar - letters.transform(np.stack([way, np.cross(out, way), out, place], axis=1))
 
 
 def letter_height(text: str, radius: float) -> float:

@@ -12,10 +12,10 @@ import numpy as np
 from ..errors import InputError, words_of_number
 from ..grid.certificate import check_passed
 from ..grid.grid import Grid
-from ..grid.marks import node_marks
+from ..grid.marks import member_marks, node_marks
 from ..layouts.layered_grid import LayeredGrid
 from ..runtime.files import check_place, write_files
-from .engraving import engraved
+from .engraving import engraved, engraved_member
 from .solid_files import Solid, encode_3mf, encode_stl
 
 SUFFIXES = (".3mf", ".stl")
@@ -95,7 +95,7 @@ def build_solid(
     member_diameter, node_diameter : diameters in the solid, not scaled [unit of the grid]
     scale : size of the solid over the size of the grid
     sides : sides of a member
-    marks : engrave the mark of each node on its ball
+    marks : engrave the marks of the nodes on their balls, those of the members along them
 
     Raises
     ------
@@ -106,10 +106,10 @@ def build_solid(
     used, edges = np.unique(grid.edges, return_inverse=True)
     edges = edges.reshape(-1, 2)
     nodes = np.asarray(grid.nodes[used], np.float64) * scale
-    parts = [
-        *balls_of(grid, used, nodes, node_diameter / 2, sides, marks),
-        *bars_of(nodes, edges, member_diameter / 2, sides),
-    ]
+    bars = bars_of(nodes, edges, member_diameter / 2, sides)
+    if marks:
+        bars = marked_bars(grid, nodes, edges, bars, member_diameter / 2, node_diameter / 2, sides)
+    parts = [*balls_of(grid, used, nodes, node_diameter / 2, sides, marks), *bars]
     order = _curve_order(np.concatenate([nodes, nodes[edges].mean(axis=1)]))
     pieces = _count_pieces(len(nodes), edges)
     return as_solid(unite([parts[k] for k in order]), grid.unit, pieces, len(edges) - len(nodes) + pieces)
@@ -182,6 +182,18 @@ def balls_of(
         engraved(ball, radius, names[k], normals[k]).translate(tuple(node))
         for k, node in zip(ids.tolist(), nodes.tolist(), strict=True)
     ]
+
+
+def marked_bars(
+    grid: Grid, nodes: np.ndarray, edges: np.ndarray, bars: list[Any], radius: float, ball: float, sides: int
+) -> list[Any]:
+    """Return the members (E, 2) with their marks engraved outside, in the middle between the balls; nodes of the solid."""
+    names, normals = member_marks(grid), _normals(grid)[grid.edges].sum(axis=1)
+    made = []
+    for name, normal, bar, (a, b) in zip(names, normals, bars, nodes[edges], strict=True):
+        length = float(np.linalg.norm(b - a))
+        made.append(engraved_member(bar, radius, sides, name, (a + b) / 2, (b - a) / length, normal, length - 2 * ball))
+    return made
 
 
 def _normals(grid: Grid) -> np.ndarray:

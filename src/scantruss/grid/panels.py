@@ -25,9 +25,11 @@ def table_of(loops: list[list[int]]) -> np.ndarray:
     return table
 
 
-def turned_panels(panels: np.ndarray) -> np.ndarray:
-    """Return panels seen from the other side."""
-    return table_of([loop[::-1] for loop in loops_of(panels)])
+def turned_panels(panels: np.ndarray, which: np.ndarray) -> np.ndarray:
+    """Return panels (P, K), those of a mask (P,) seen from the other side."""
+    if not which.any():
+        return panels
+    return table_of([loop[::-1] if turn else loop for loop, turn in zip(loops_of(panels), which, strict=True)])
 
 
 def sizes_of(panels: np.ndarray) -> np.ndarray:
@@ -73,6 +75,12 @@ def triangles_of(nodes: np.ndarray, panels: np.ndarray) -> np.ndarray:
 def panel_of_triangles(panels: np.ndarray) -> np.ndarray:
     """Return the panel that each triangle of `triangles_of` belongs to (T,)."""
     found: np.ndarray = np.repeat(np.arange(len(panels)), sizes_of(panels) - 2)
+    return found
+
+
+def first_triangles(panels: np.ndarray) -> np.ndarray:
+    """Return the first of the triangles of `triangles_of` that belong to each panel (P,)."""
+    found: np.ndarray = np.cumsum(sizes_of(panels) - 2) - (sizes_of(panels) - 2)
     return found
 
 

@@ -10,11 +10,12 @@ import numpy as np
 
 from ..errors import InputError
 from ..grid.marks import member_marks, node_marks, numbered
-from ..grid.panels import turned_panels
+from ..grid.panels import first_triangles, turned_panels
 from ..layouts.double_layer import DoubleLayer
 from ..layouts.double_layer import double_layer as make_double_layer
 from ..scan.vectors import units
 from ..settings import UNITS
+from .areas import turned_pieces
 from .catalogue import Material, Section, find_material, find_section
 from .loads import cases_of, usual_combinations
 from .quantities import LENGTH, quantity
@@ -62,9 +63,9 @@ def truss_of_grid(
     if lengths.min() <= 0:
         raise InputError(f"member {marks[int(lengths.argmin())]} has no length; a structure needs nodes apart")
     areas = area_vectors(nodes, triangles)
-    turned = bool(areas[:, 2].sum() < -1e-9 * np.abs(areas).sum())
-    if turned:  # a shell is loaded from above
-        triangles, areas = triangles[:, ::-1].copy(), -areas
+    turned = turned_pieces(nodes, triangles)  # a shell is loaded from above
+    triangles = np.where(turned[:, None], triangles[:, ::-1], triangles)
+    areas = np.where(turned[:, None], -areas, areas)
     node_normals = np.zeros_like(nodes)
     for corner in triangles.T:
         np.add.at(node_normals, corner, areas)
@@ -72,7 +73,7 @@ def truss_of_grid(
         nodes=nodes,
         members=members,
         triangles=triangles,
-        panels=None if grid.panels is None else turned_panels(grid.panels) if turned else grid.panels,
+        panels=None if grid.panels is None else turned_panels(grid.panels, turned[first_triangles(grid.panels)]),
         node_normals=units(node_normals),
         member_normals=units(_at_members(grid, units(areas))),
         sections=(find_section(section) if isinstance(section, str) else section,),

@@ -16,11 +16,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..kernels.structure.members import beam_forces
 from .frame import BEND_Y1, BEND_Z1, BOW, LENGTHEN, TWIST, inner_turns, natural_stiffness
 from .truss import Truss
 
 SERIES_TERMS = 24  #: of the series of an angle over its sine
 FARTHEST_TURN = 0.5  #: cosine of the turn of an end against the chord beyond which an element is too coarse: 60 degrees
+_SERIES = np.cumprod([1.0, *(n / (2 * n + 1) for n in range(1, SERIES_TERMS))])  # of powers of 1 - cosine
 _ENDS = np.array([0, 1, 2, 3, 4, 5, 0, 1, 2, 6, 7, 8])  # of chord and turns, in the order of displacements
 _SIGNS = np.repeat([-1.0, 1.0, 1.0, 1.0], 3)
 
@@ -63,18 +65,24 @@ class Members:
 
 
 @dataclass(frozen=True, eq=False)
-class Response:
+class Answer:
     """What members answer to displacements."""
 
     forces: np.ndarray  #: (M, 2 d) of the nodes on the members, in global axes [N, Nm]
-    tangents: np.ndarray | None  #: (M, 2 d, 2 d) derivative of the forces
     natural: np.ndarray  #: (M, r) forces that belong to the natural deformations
+    too_far: bool  #: an end turned too far against its chord; the other values are not to be used
+
+
+@dataclass(frozen=True, eq=False)
+class Response(Answer):
+    """The same with its derivatives."""
+
+    tangents: np.ndarray | None  #: (M, 2 d, 2 d) derivative of the forces
     strained: np.ndarray  #: (M, 2 d) derivative of the forces by a factor on the initial strain
     stiffness: np.ndarray  #: (M, r, r) derivative of the natural forces by the natural deformations
     slope: (
         np.ndarray
     )  #: (M, r, 9) derivative of those by the chord and the turns of both ends, or (M, 1, 3) by the chord
-    too_far: bool  #: an end turned too far against its chord; the other values are not to be used
 
     def foresee(self, step: np.ndarray) -> np.ndarray:
         """Return the (M, r) natural forces after small displacements (M, 2 d) of the ends, by the derivatives here."""
@@ -82,6 +90,16 @@ class Response:
         chord = step[:, width : width + 3] - step[:, :3]
         ways = chord if width == 3 else np.concatenate([chord, step[:, 3:6], step[:, 9:]], axis=1)
         return self.natural + _times(self.stiffness, _times(self.slope, ways))
+
+
+def answer(members: Members, moves: np.ndarray, turns: np.ndarray, strain: np.ndarray, factor: float) -> Answer:
+    """Return the forces of the members alone, which takes a tenth of the time of `respond`; parameters as there."""
+    if members.bending.shape[1] == 1:
+        return respond(members, moves, turns, strain, factor)
+    natural, forces = np.empty((len(members.ends), 6)), np.empty((len(members.ends), 12))
+    shape = members.ends, members.chords, members.axes, members.axial, members.bending, members.bow
+    least = beam_forces(*shape, _SERIES, moves, turns, factor * strain, natural, forces)
+    return Answer(forces, natural, bool(least < FARTHEST_TURN))
 
 
 def respond(
@@ -286,9 +304,7 @@ def _angle_over_sine(cosine: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.nda
     """Return angle / sine and its first two derivatives by the cosine: the sum of n! (1 - cosine)^n / (2 n + 1)!!."""
     gap = np.clip(1 - cosine, 0.0, 1 - FARTHEST_TURN)
     values = np.zeros((3, len(gap)))
-    factor = 1.0
-    coefficients = [1.0] + [factor := factor * n / (2 * n + 1) for n in range(1, SERIES_TERMS)]
-    for coefficient in reversed(coefficients):  # Horner's rule with derivatives
+    for coefficient in reversed(_SERIES):  # Horner's rule with derivatives
         values[2] = values[2] * gap + 2 * values[1]
         values[1] = values[1] * gap + values[0]
         values[0] = values[0] * gap + coefficient

@@ -11,9 +11,9 @@ from scipy.sparse import csc_matrix, identity
 from scipy.sparse.linalg import SuperLU, splu
 from scipy.spatial.transform import Rotation
 
-from .corotational import Members, Response, respond
+from .corotational import Answer, Members, Response, answer, respond
 from .frame import freedoms, member_freedoms
-from .mechanism import softest_motion
+from .mechanism import pivots, softest_motion
 from .statics import IN_ORDER, SINGULAR, Factored, dead_loads
 from .truss import LoadCase
 
@@ -43,7 +43,7 @@ class Tangent:
     @cached_property
     def negative(self) -> int:
         """Negative pivots: as many as ways in which the state is not stable."""
-        return int((self.lu.U.diagonal() < 0).sum())
+        return int((pivots(self.lu) < 0).sum())
 
     def solve(self, loads: np.ndarray) -> np.ndarray:
         """Return the (F,) or (F, C) displacements of loads."""
@@ -112,8 +112,12 @@ class Equilibrium:
             turns = 1.5 * turns - 0.5 * turns @ turns.transpose(0, 2, 1) @ turns  # as round-off does not let them be
         return LoadedState(state.moves + each[:, :3] + more * self.settled, turns, state.factor + more)
 
+    def answer(self, state: LoadedState) -> Answer:
+        """Return the forces of the members alone."""
+        return answer(self.members, state.moves, state.turns, self.strain, state.factor)
+
     def respond(self, state: LoadedState, *, foreseen: np.ndarray | None = None, tangents: bool = False) -> Response:
-        """Return what the members answer."""
+        """Return what the members answer, with its derivatives."""
         given = self.members, state.moves, state.turns, self.strain, state.factor
         return respond(*given, foreseen=foreseen, tangents=tangents)
 
@@ -123,12 +127,12 @@ class Equilibrium:
         every[self.free] = step
         return response.foresee(every[self.rows])
 
-    def unbalanced(self, state: LoadedState, response: Response) -> np.ndarray:
+    def unbalanced(self, state: LoadedState, response: Answer) -> np.ndarray:
         """Return the loads less the forces of members and springs, on all displacements; at supports less the reactions."""
         made = state.factor * self.loads - self._sum(response.forces)
         return made - self._of_springs(state)
 
-    def reactions(self, state: LoadedState, response: Response) -> np.ndarray:
+    def reactions(self, state: LoadedState, response: Answer) -> np.ndarray:
         """Return the (V, 6) reactions of held supports and springs [N, Nm]."""
         made = np.zeros(self.count)
         held = np.setdiff1d(np.arange(self.count), self.free)
@@ -136,7 +140,7 @@ class Equilibrium:
         made -= self._of_springs(state)
         return np.pad(made.reshape(-1, self.width), ((0, 0), (0, 6 - self.width)))
 
-    def error(self, state: LoadedState, response: Response, unbalanced: np.ndarray) -> float:
+    def error(self, state: LoadedState, response: Answer, unbalanced: np.ndarray) -> float:
         """Return what is unbalanced on free displacements, over the size of loads, reactions and forces; moments count over an arm."""
         left = np.square(unbalanced / self.arms)
         free = float(left[self.free].sum())

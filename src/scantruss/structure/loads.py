@@ -1,13 +1,14 @@
 """Loads: from words such as `snow:1kN/m2` or tables of a settings file to forces on nodes and members.
 
-A load on an area is shared by the three nodes of each triangle. Loads of one name are one load case.
+A load on an area is shared by the nodes around it (see `areas`). Loads of one name are one load case.
 
 On the command line:
 
 - `self`: weight of the members, more by the allowance for the nodes
 - `cladding:0.5kN/m2`: weight on the surface
 - `snow:1kN/m2`: on the plan area of what faces up
-- `half-snow:1kN/m2`: the same beyond the middle of the area towards +x, +y, -x and -y, four cases; `@30` towards 30 degrees from x
+- `half-snow:1kN/m2`: the same beyond the middle of the area towards +x, +y, -x and -y, four cases; `@30` towards 30 degrees from x,
+  `@all` every 30 degrees
 - `wind:0.8kN/m2:-0.7`: pressure times coefficient against the outer normal; `wind:0.8kN/m2:0.8/-0.5@90` with one coefficient
   for what faces a wind that blows towards 90 degrees from x, another for the rest
 - `temperature:30K`: of all members
@@ -17,8 +18,9 @@ On the command line:
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import product
 from typing import TYPE_CHECKING, Any
@@ -26,6 +28,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError
+from .areas import LoadedAreas, loaded_areas
 from .quantities import FORCE, FORCE_PER_LENGTH, LENGTH, PRESSURE, TEMPERATURE, quantity
 from .supports import support_nodes
 from .truss import Combination, LoadCase
@@ -38,8 +41,11 @@ VARIABLE_FACTOR = 1.5  #: of variable actions: EN 1990 table A1.2(B)
 #: psi 0 of EN 1990 table A1.1: imposed loads of category A, snow up to 1000 m above the sea, wind, temperature
 COMPANION = {"variable": 0.7, "snow": 0.5, "wind": 0.6, "temperature": 0.6}
 ACTIONS = ("permanent", *COMPANION)
+ON_AREAS = ("cladding", "snow", "half-snow", "wind")
 LOAD_WORDS = "self, cladding:P, snow:P, half-snow:P, wind:P:C, temperature:T"
-ONCE = ("self", "snow", "half-snow", "temperature")  #: loads of which a second one is a slip
+ONCE = ("self", "snow", "temperature")  #: loads of which a second one is a slip
+HALVES = (0.0, 90.0, 180.0, 270.0)  #: directions of half the snow, unless told otherwise [degree from x]
+ALL_HALVES = tuple(30.0 * k for k in range(12))  #: those of `@all`
 MOST_COMBINATIONS = 200  #: made without being asked for one by one
 
 
@@ -61,6 +67,7 @@ def cases_of(truss: Truss, loads: str | Sequence[Any], node_allowance: float = 0
                 f"the load {name} is given {words.count(name)} times; give it once, or cases of other names in a file"
             )
     found: dict[str, LoadCase] = {}
+    halves: set[str] = set()
     for load in given:
         if isinstance(load, LoadCase):
             made = [load]
@@ -68,6 +75,9 @@ def cases_of(truss: Truss, loads: str | Sequence[Any], node_allowance: float = 0
             made = [_of_table(truss, load, node_allowance)]
         else:
             made = _of_words(truss, str(load).strip(), node_allowance)
+            if twice := next((case.name for case in made if case.name in halves), ""):
+                raise InputError(f"the load {twice} is given 2 times; give each direction once")
+            halves |= {case.name for case in made if case.name.startswith("half-snow")}
         for case in made:
             found[case.name] = _added(found[case.name], case) if case.name in found else case
     if not found:
@@ -136,67 +146,62 @@ def _of_words(truss: Truss, words: str, node_allowance: float) -> list[LoadCase]
     if name == "temperature" and rest:
         change = quantity(rest, TEMPERATURE, "a change of temperature")
         return [LoadCase("temperature", "temperature", temperature=np.full(len(truss.members), change))]
-    if name not in _ON_AREAS:
+    if name not in ON_AREAS:
         raise InputError(f"no load {words!r}; use {LOAD_WORDS} with units, as in snow:1kN/m2, or a file")
     rest, at, direction = rest.partition("@")
     pressure, _, coefficient = rest.partition(":")
     if at and name not in ("half-snow", "wind"):
         raise InputError(f"{name} has no direction, got {words!r}")
+    every = name == "half-snow" and direction == "all"
     angle = float(direction) if re.fullmatch(r"[-+]?\d+\.?\d*", direction) else None
-    if at and angle is None:
+    if at and angle is None and not every:
         raise InputError(f"a direction is degrees from x in plan, as in {name}:1kN/m2@90, got {words!r}")
     value = quantity(pressure, PRESSURE, f"{name}, a load on an area,")
     if len(truss.triangles) == 0:
         raise InputError(f"the load {name} acts on an area, and the grid has no triangles")
+    areas = loaded_areas(truss.nodes, truss.panel_table)
     if value < 0 and name != "wind":
         raise InputError(
             f"{name} weighs down and must be positive, got {pressure}; loads that lift are wind, or forces in a file"
         )
     if name == "wind":
-        return [_wind(truss, value, coefficient, angle)]
+        return [_wind(areas, value, coefficient, angle)]
     if coefficient:
         raise InputError(f"{name} takes one pressure, got {words!r}")
     if name != "half-snow":
         action = "permanent" if name == "cladding" else "snow"
-        return [LoadCase(name, action, nodal=_ON_AREAS[name](truss, value))]
-    angles = [0.0, 90.0, 180.0, 270.0] if angle is None else [angle]
-    return [LoadCase(f"half-snow {way:g}", "snow", nodal=_on_half(truss, value, way)) for way in angles]
+        return [LoadCase(name, action, nodal=(_cladding if name == "cladding" else _snow)(areas, value))]
+    if not areas.plan.any():
+        raise InputError("no part of the grid faces up, so there is no half of snow")
+    ways = ALL_HALVES if every else HALVES if angle is None else (angle,)
+    return [LoadCase(f"half-snow {way:g}", "snow", nodal=_on_half(areas, value, way)) for way in ways]
 
 
-def _on_nodes(truss: Truss, forces: np.ndarray) -> np.ndarray:
-    """Return (V, 6) loads on nodes of (T, 3) forces on triangles, a third to each node."""
-    nodal = np.zeros((len(truss.nodes), 6))
-    for corner in truss.triangles.T:
-        np.add.at(nodal[:, :3], corner, forces / 3)
-    return nodal
-
-
-def _cladding(truss: Truss, pressure: float) -> np.ndarray:
+def _cladding(areas: LoadedAreas, pressure: float) -> np.ndarray:
     """Return weight on the surface."""
-    area = np.linalg.norm(truss.triangle_areas, axis=1)
-    return _on_nodes(truss, -pressure * area[:, None] * [0.0, 0.0, 1.0])
+    return areas.on_nodes(-pressure * areas.surface[:, None] * [0.0, 0.0, 1.0])
 
 
-def _snow(truss: Truss, pressure: float) -> np.ndarray:
+def _snow(areas: LoadedAreas, pressure: float) -> np.ndarray:
     """Return a load on the plan area of what faces up."""
-    plan = np.maximum(truss.triangle_areas[:, 2], 0.0)
-    return _on_nodes(truss, -pressure * plan[:, None] * [0.0, 0.0, 1.0])
+    return areas.on_nodes(-pressure * areas.plan[:, None] * [0.0, 0.0, 1.0])
 
 
-def _on_half(truss: Truss, pressure: float, angle: float) -> np.ndarray:
-    """Return snow on the triangles beyond the middle of the plan area, in a direction [degree from x]."""
-    plan = np.maximum(truss.triangle_areas[:, 2], 0.0)
-    middle = truss.nodes[truss.triangles].mean(axis=1)[:, :2]
-    away = (middle - np.average(middle, axis=0, weights=plan)) @ _direction(angle)[:2]
-    beyond = plan * (away > 1e-9 * np.abs(away).max())
-    return _on_nodes(truss, -pressure * beyond[:, None] * [0.0, 0.0, 1.0])
+def _on_half(areas: LoadedAreas, pressure: float, angle: float) -> np.ndarray:
+    """Return snow on what lies beyond the middle of the plan area, in a direction [degree from x]."""
+    middle = areas.middles[:, :2]
+    away = (middle - np.average(middle, axis=0, weights=areas.plan)) @ _direction(angle)[:2]
+    beyond = areas.plan * (away > 1e-9 * np.abs(away).max())
+    return areas.on_nodes(-pressure * beyond[:, None] * [0.0, 0.0, 1.0])
 
 
-def _wind(truss: Truss, pressure: float, coefficient: str, angle: float | None) -> LoadCase:
+def _wind(areas: LoadedAreas, pressure: float, coefficient: str, angle: float | None) -> LoadCase:
     """Return wind: pressure times coefficient against the outer normal."""
     words = (coefficient or "1").split("/")
     try:
         windward, leeward = float(words[0]), float(words[-1])
+        if not (math.isfinite(windward) and math.isfinite(leeward)):
+            raise ValueError(coefficient)
     except ValueError:
         raise InputError(
             f"coefficients of wind are numbers, as in wind:0.8kN/m2:0.8/-0.5@90, got {coefficient!r}"
@@ -206,21 +211,16 @@ def _wind(truss: Truss, pressure: float, coefficient: str, angle: float | None) 
     if angle is None:
         factor: Any = windward
     else:
-        faces = truss.triangle_areas @ _direction(angle) < 0
+        faces = areas.signs * (areas.vectors @ _direction(angle)) < 0
         factor = np.where(faces, windward, leeward)[:, None]
     name = "wind" if angle is None else f"wind {angle:g}"
-    return LoadCase(name, "wind", nodal=_on_nodes(truss, -pressure * factor * truss.triangle_areas))
+    return LoadCase(name, "wind", nodal=areas.on_nodes(-pressure * factor * areas.vectors))
 
 
 def _direction(angle: float) -> np.ndarray:
     """Return the unit vector in plan at an angle from x [degree]."""
     turn = np.radians(angle)
     return np.array([np.cos(turn), np.sin(turn), 0.0])
-
-
-_ON_AREAS: dict[str, Callable[[Truss, float], np.ndarray]] = {
-    "cladding": _cladding, "snow": _snow, "half-snow": _snow, "wind": _snow,
-}  # fmt: skip
 
 
 def _of_table(truss: Truss, table: Mapping[str, Any], node_allowance: float) -> LoadCase:

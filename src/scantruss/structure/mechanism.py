@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import NoReturn
 
 import numpy as np
@@ -9,6 +10,7 @@ from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import SuperLU
 
 from ..errors import InputError
+from ..kernels.geometry.components import component_labels
 from .truss import Truss
 
 MOST_NAMED = 4  #: nodes of a mechanism that are named
@@ -27,13 +29,31 @@ def softest_motion(stiffness: csc_matrix, factor: SuperLU) -> tuple[float, np.nd
     """
     motion = np.random.default_rng(1).standard_normal(stiffness.shape[0])
     for _ in range(INVERSE_STEPS):
-        motion /= np.linalg.norm(motion)
+        motion /= math.sqrt(product(motion, motion))
         found = factor.solve(motion)
         if not np.isfinite(found).all() or not found.any():
             break
         motion = found
-    motion /= np.linalg.norm(motion)
-    return float(motion @ (stiffness @ motion)), motion
+    motion /= math.sqrt(product(motion, motion))
+    return product(motion, stiffness @ motion), motion
+
+
+def pivots(factor: SuperLU) -> np.ndarray:
+    """Return the pivots of a factored matrix (F,); to be asked once of each.
+
+    They stand in copies of both factors which SuperLU makes when it is asked and keeps as long as it lives, as large as itself: so the
+    copies are emptied.
+    """
+    found: np.ndarray = factor.U.diagonal()
+    for copy in (factor.L, factor.U):
+        copy.data, copy.indices = copy.data[:0].copy(), copy.indices[:0].copy()
+        copy.indptr = np.zeros_like(copy.indptr)
+    return found
+
+
+def product(one: np.ndarray, other: np.ndarray) -> float:
+    """Return the scalar product of two long vectors; BLAS would wake threads for it, which wait for each other on a busy machine."""
+    return float((one * other).sum())
 
 
 def refuse_mechanism(truss: Truss, motion: np.ndarray) -> NoReturn:
@@ -53,6 +73,13 @@ def refuse_mechanism(truss: Truss, motion: np.ndarray) -> NoReturn:
     alone = np.setdiff1d(np.arange(len(truss.nodes)), truss.members)
     if len(alone):
         raise InputError(f"a mechanism: no member holds the node {truss.node_marks[alone[0]]}; remove it from the grid")
+    piece = component_labels(len(truss.nodes), *truss.members.T)
+    loose = np.setdiff1d(piece, piece[truss.supports.any(axis=1)])
+    if len(loose):
+        more = int((piece == loose[0]).sum()) - 1
+        raise InputError(
+            f"a mechanism: the piece of the node {truss.node_marks[loose[0]]} and {more:,} more has no support; hold it too"
+        )
     length = float(np.median(truss.lengths))
     moves = np.linalg.norm(motion[:, :3], axis=1)
     turns = length * np.linalg.norm(motion[:, 3:], axis=1)

@@ -1,25 +1,34 @@
 """Linear buckling and natural frequencies: the eigenmodes of a structure.
 
 Both are the largest eigenvalues of A x = mu K x, with the factored stiffness K: A is the mass, or less the geometric stiffness.
+Modes of shells lie close together, so the largest is found roughly, and K - A / mu factored a little before it: there they lie far apart.
 """
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.linalg import eigh
 from scipy.sparse import csc_matrix, diags
-from scipy.sparse.linalg import LinearOperator, eigsh
+from scipy.sparse.linalg import LinearOperator, SuperLU, eigsh, splu
 
 from ..errors import InputError
 from .frame import BEND_Y1, BEND_Z1, BOW, LENGTHEN, assemble, freedoms, inner_turns, member_freedoms, transforms
-from .statics import CaseResult, Factored, Solution
+from .mechanism import pivots, product
+from .statics import IN_ORDER, CaseResult, Factored, Solution
 from .truss import GRAVITY, Truss
 
 FEW_FREEDOMS = 200  #: up to which all modes are found at once by dense matrices
 SEVERAL_LEADING = 3  #: combinations of which buckling is looked at, with different leading actions
+ROUGH = 1e-2  #: relative error of the first estimate
+MODE_SHIFTS = (
+    0.97,
+    0.8,
+    0.5,
+)  #: shares of the first value about which the others are looked for, until none lies before
 NEGLIGIBLE = 1e-9  #: share of the largest eigenvalue below which one is nil
 
 
@@ -122,6 +131,29 @@ def _geometric(truss: Truss, axial: np.ndarray) -> np.ndarray:
     return made
 
 
+def _of_many(part: csc_matrix, stiff: csc_matrix, factor: SuperLU, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return `count` largest eigenvalues of `part` x = mu `stiff` x (K,) with their vectors (F, K), or one that is not positive."""
+    given: dict[str, Any] = {"M": stiff, "v0": np.random.default_rng(1).standard_normal(stiff.shape[0])}
+    given["Minv"] = LinearOperator(stiff.shape, matvec=factor.solve, dtype=float)
+    first, vectors = eigsh(part, k=1, which="LA", tol=ROUGH, **given)
+    usual = factor.solve(part @ given["v0"])
+    if first[0] ** 2 * product(given["v0"], given["v0"]) <= NEGLIGIBLE**2 * product(usual, usual) or first[0] < 0:
+        return first, vectors
+    for share in MODE_SHIFTS:
+        shift = share / float(first[0])
+        try:
+            moved = splu((stiff - shift * part).tocsc(), **IN_ORDER)
+        except RuntimeError:  # an eigenvalue lies there
+            continue
+        if (moved.perm_r == moved.perm_c).all() and (pivots(moved) > 0).all():  # none lies before
+            near = LinearOperator(stiff.shape, matvec=moved.solve, dtype=float)
+            about = {"sigma": shift, "OPinv": near, "mode": "buckling", "which": "LA", "v0": given["v0"]}
+            factors, vectors = eigsh(stiff, k=count, M=part, tol=1e-10, **about)
+            return 1 / factors, vectors
+    values, vectors = eigsh(part, k=count, which="LA", tol=1e-10, **given)
+    return values, vectors
+
+
 def _largest(factored: Factored, matrix: csc_matrix, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the largest positive eigenvalues of `matrix` x = mu K x, largest first, and (K, V, 3) shapes."""
     if not isinstance(count, int) or count < 1:
@@ -136,9 +168,7 @@ def _largest(factored: Factored, matrix: csc_matrix, count: int) -> tuple[np.nda
     if len(free) <= max(FEW_FREEDOMS, 3 * count):
         values, vectors = eigh(part.toarray(), stiff.toarray())
     else:
-        inverse = LinearOperator(stiff.shape, matvec=factored.factor.solve, dtype=float)
-        start = np.random.default_rng(1).standard_normal(len(free))
-        values, vectors = eigsh(part, k=count, M=stiff, Minv=inverse, which="LA", v0=start, tol=1e-10)
+        values, vectors = _of_many(part, stiff, factored.factor, count)
     order = [k for k in np.argsort(-values)[:count] if values[k] > NEGLIGIBLE * np.abs(values).max()]
     shapes = np.zeros((len(order), nodes, 3))
     for number, k in enumerate(order):

@@ -1,8 +1,8 @@
 """The path of a structure under a growing load: geometrically nonlinear statics by arc length.
 
 Each step ends on a sphere around the state before, its radius the arc length (Crisfield 1981), whose equation is solved together with
-equilibrium in linearized form (Schweizerhof and Wriggers 1986). The tangent of the state before serves until it no longer brings
-forces together fast, then a new one is factored.
+equilibrium in linearized form (Schweizerhof and Wriggers 1986). The tangent of the state before serves as long as the iterations that
+are left are likely to take less time than a new one; they are mixed (Anderson 1965), which makes up for most of its age.
 """
 
 from __future__ import annotations
@@ -18,6 +18,8 @@ from ..runtime.progress import Progress
 from .corotational import Response
 from .equilibrium import Equilibrium, LoadedState, Tangent
 from .imperfections import Imperfection, imperfection_of
+from .mechanism import product
+from .mixture import Mixture
 from .modes import Modes, buckling_modes, worst_buckling
 from .statics import Factored, factor_stiffness, solve
 from .truss import LoadCase, Truss
@@ -28,8 +30,8 @@ STEPS_BEYOND = 5  #: steps after the structure has lost its stability
 MULTIPLE = 2.0  #: of the linear buckling factor, at which a path ends that stays stable
 UNBUCKLED_FACTOR = 10.0  #: load factor at which a path ends that stays stable where linear theory does not buckle
 BALANCED = 1e-9  #: error of equilibrium at which a step has converged
-ITERATIONS = 25  #: of a step at most
-WANTED_WORK = 12  #: iterations of a step, and four more for each tangent; more make the next shorter
+ITERATIONS = 50  #: of a step at most
+WANTED_WORK = 11  #: iterations of a step, and four more for each tangent; more make the next shorter
 SMOOTH_STEP = (
     0.8,
     0.5,
@@ -37,7 +39,8 @@ SMOOTH_STEP = (
 SMOOTH_CUTS = 5  #: halvings of a step for that
 TANGENTS = 6  #: factored within a step at most
 ROUGH_GUESS = 0.2  #: error of a first guess above which the tangent of the state before is of no use
-SLOW = 0.2  #: share of the error left by an iteration, above which a new tangent is factored
+FIRST_RATE = 0.1  #: share of the error that an iteration is taken to leave before it is known
+PATIENCE = 15.0  #: iterations that take as long as a tangent; a new one is factored if more are likely
 ARC_GROWTH = (0.5, 1.5)  #: of the arc length from step to step
 CUTS = 10  #: halvings of a step, after which a path ends
 REFINEMENTS = 14  #: of the place where stability is lost
@@ -141,22 +144,24 @@ def solve_path(
     linear = float(modes.values[0]) if len(modes.values) else None
     case = combined_case(truss, modes.of)
     last = stop_factor or (MULTIPLE * linear if linear else UNBUCKLED_FACTOR)
-    found: Path | None = None
     shapes = list(imperfection_of(truss, imperfection, modes))
     factored = replace(factored, factor=None)  # as large as a tangent, of which several are kept
+    found: tuple[_Walk, Imperfection] | None = None
     for shape in shapes:
-        limit = found.limit_factor if found else None
+        limit = found[0].limit_factor if found else None
         end = last if limit is None else min(last, limit)
         bent = truss.replace(nodes=shape.perfect + shape.moves)
         balance = Equilibrium(replace(factored, truss=bent), case)
         walk = _Walk(balance, min(linear or math.inf, last) / FIRST_STEPS, end, steps, beyond, progress)
-        walk.run()
-        now = walk.path(modes.of, shape, linear)
-        lower = now.limit_factor is not None and (limit is None or now.limit_factor < limit * (1 - SAME_FACTOR))
-        if found is None or lower:
-            found = now
+        walk.run(to_critical=len(shapes) > 1)
+        now = walk.limit_factor
+        if found is None or (now is not None and (limit is None or now < limit * (1 - SAME_FACTOR))):
+            found = walk, shape
+        del walk, balance
     assert found is not None
-    return found
+    chosen, shape = found
+    chosen.run()  # beyond where stability is lost, where it has not gone on
+    return chosen.path(modes.of, shape, linear)
 
 
 def _first_mode(factored: Factored, load: str) -> Modes:
@@ -188,55 +193,69 @@ class _Walk:
         self, balance: Equilibrium, first: float, end: float, steps: int, beyond: int, progress: Progress | None
     ) -> None:
         self.balance, self.end, self.steps, self.beyond, self.progress = balance, end, steps, beyond, progress
-        self.first = first
+        self.arc = first  # of the first step as a load factor, until it is known as a length
         self.states: list[LoadedState] = [balance.start()]
         self.negative = [0]
         self.critical: int | None = None
         self.kind = self.ended = ""
+        self.done = self.after = 0
+        self.back = np.zeros(0)
+        self.soft = 0.0
 
-    def run(self) -> None:
-        """Take steps until the path ends."""
-        here = self._place(self.states[0])
-        arc = self.first * self._norm(here.towards)
-        done = after = 0
-        back = here.towards
-        self.soft = self._norm(here.towards)
-        while done < self.steps:  # each turn takes a step, or the path ends
+    @property
+    def limit_factor(self) -> float | None:
+        """The load factor at which the structure loses its stability, as far as is known."""
+        return None if self.critical is None else self.states[self.critical].factor
+
+    def run(self, *, to_critical: bool = False) -> None:
+        """Take steps until the path ends, or stability is lost; from there it can go on."""
+        if self.ended:
+            return
+        here = self._place(self.states[-1])
+        if not self.done:
+            self.soft, self.back = self._norm(here.towards), here.towards
+            self.arc *= self.soft
+        while self.done < self.steps:  # each turn takes a step, or the path ends
             for cut in range(CUTS + 1):
                 step = None  # lets go of its tangent
-                step = self._step(here, back, arc)
+                step = self._step(here, self.back, self.arc)
                 if step is not None and (cut >= SMOOTH_CUTS or self._is_smooth(here, step)):
                     break
-                arc /= 2
+                self.arc /= 2
             else:
                 self.ended = f"no state of equilibrium was found beyond the factor {here.state.factor:.4g}"
                 return
             there, taken, work = step
             del step
-            done += 1
+            self.done += 1
             if there.tangent.negative == 0 and there.state.factor >= self.end:
                 there = self._at_factor(here, taken, there)
             elif self.critical is None and there.tangent.negative:
-                self._find_critical(here, back, arc, there, taken)
+                state, known = there.state, (there.tangent.smallest, there.state.factor, self._falls(there, taken))
+                del there  # lets go of its tangent
+                self._find_critical(here, self.back, self.arc, known)
+                there = self._place(state)
             self._keep(there)
             if self.progress is not None:
-                self.progress("path", done / self.steps)
+                self.progress("path", self.done / self.steps)
             if there.state.factor >= self.end * (1 - SAME_FACTOR):
                 self.ended = f"the load factor {self.end:.4g} is reached"
                 return
             if self.critical is not None:
-                after += 1
-                if after > self.beyond:
+                self.after += 1
+                if self.after > self.beyond:
                     self.ended = f"{self.beyond} steps beyond the {self.kind}"
                     return
-            here, back = there, taken
-            arc *= min(max(math.sqrt(WANTED_WORK / work), ARC_GROWTH[0]), ARC_GROWTH[1])
+            here, self.back = there, taken
+            self.arc *= min(max(math.sqrt(WANTED_WORK / work), ARC_GROWTH[0]), ARC_GROWTH[1])
+            if to_critical and self.critical is not None:
+                return
         self.ended = f"{self.steps} steps are done"
 
     def path(self, name: str, imperfection: Imperfection, linear: float | None) -> Path:
         """Return what was found."""
         balance = self.balance
-        answers = [balance.respond(state) for state in self.states]
+        answers = [balance.answer(state) for state in self.states]
         pairs = list(zip(self.states, answers, strict=True))
         return Path(
             truss=balance.truss,
@@ -275,49 +294,54 @@ class _Walk:
         """Return the state at an arc length, or at the load factor `to`, with the way there and the work; None if none is found."""
         balance, tangent, towards = self.balance, here.tangent, here.towards
         scale = balance.weights**2
-        ahead = float(back @ (scale * towards))
+        ahead = product(back, scale * towards)
         more = math.copysign(arc / self._norm(towards), ahead) if to is None else to - here.state.factor
-        taken, state, before = more * towards, here.state, ROUGH_GUESS / SLOW
+        taken, state = more * towards, here.state
         first = step = taken
-        response, fresh = here.response, 0
+        mixture, fresh, rate, error = Mixture(balance.weights), 0, 1.0, 0.0
         for iteration in range(1, ITERATIONS + 1):
-            foreseen = balance.foresee(response, step)
-            state = balance.moved(state, step, more)
-            response = balance.respond(state, foreseen=foreseen)
-            if response.too_far or not np.isfinite(response.forces).all():
+            last, state = state, balance.moved(state, step, more)
+            answer = balance.answer(state)
+            if answer.too_far or not np.isfinite(answer.forces).all():
                 return None
-            left = balance.unbalanced(state, response)
-            error = balance.error(state, response, left)
+            left = balance.unbalanced(state, answer)
+            before, error = error, balance.error(state, answer, left)
             if error <= BALANCED:
-                if to is None and taken @ (scale * first) <= 0:  # it has turned back
+                if to is None and product(taken, scale * first) <= 0:  # it has turned back
                     return None
                 tangent = here.tangent  # lets go of a newer one, which takes much memory
                 return self._place(state), taken, iteration + 4 * fresh
-            if error > SLOW * before:
+            if iteration == 1:
+                rate = 1.0 if error > ROUGH_GUESS else FIRST_RATE
+            else:
+                rate = error / before if iteration == 2 else math.sqrt(rate * error / before)
+            if rate >= 1 or math.log(BALANCED / error) < PATIENCE * math.log(rate):
                 if fresh == TANGENTS:
                     return None
-                fresh += 1
-                response = balance.respond(state, foreseen=foreseen, tangents=True)
+                fresh, rate, mixture = fresh + 1, FIRST_RATE, Mixture(balance.weights)
+                before_it = here.response if last is here.state else balance.respond(last)
+                response = balance.respond(state, foreseen=balance.foresee(before_it, step), tangents=True)
+                tangent = here.tangent  # lets go of a newer one, which takes much memory
                 tangent = balance.tangent(response)
                 towards = tangent.solve(balance.direction(response))
-            before = error
             step, more = tangent.solve(left[balance.free]), 0.0
             if to is None:
-                off = (self._norm(taken) ** 2 - arc**2) / 2 + taken @ (scale * step)
-                more = float(-off / (taken @ (scale * towards)))
+                off = (self._norm(taken) ** 2 - arc**2) / 2 + product(taken, scale * step)
+                more = -off / product(taken, scale * towards)
                 step = step + more * towards
+            step, more = mixture.improved(step, more)
             taken = taken + step
         return None
 
     def _falls(self, place: _Place, taken: np.ndarray) -> bool:
         """Whether the load falls as the path goes on."""
-        return float(taken @ (self.balance.weights**2 * place.towards)) < 0
+        return product(taken, self.balance.weights**2 * place.towards) < 0
 
     def _is_smooth(self, here: _Place, step: tuple[_Place, np.ndarray, int]) -> bool:
         """Whether a step follows the path closely: it goes on as it began, and the stiffness (Bergan 1980) changes little."""
         there, taken, _ = step
         weighted = self.balance.weights**2 * taken
-        before, after = (float(weighted @ place.towards) / self._norm(place.towards) for place in (here, there))
+        before, after = (product(weighted, place.towards) / self._norm(place.towards) for place in (here, there))
         cosine = abs(before) / self._norm(taken)
         stiffness = [self.soft / self._norm(place.towards) for place in (here, there)]
         change = abs(stiffness[1] * math.copysign(1.0, after * before) - stiffness[0])
@@ -328,11 +352,14 @@ class _Walk:
         found = self._step(here, taken, 0.0, self.end)
         return there if found is None or found[0].tangent.negative else found[0]
 
-    def _find_critical(self, here: _Place, back: np.ndarray, arc: float, there: _Place, taken: np.ndarray) -> None:
-        """Keep the last stable state between two, where the smallest eigenvalue of the tangent is nil: regula falsi (Illinois)."""
+    def _find_critical(self, here: _Place, back: np.ndarray, arc: float, known: tuple[float, float, bool]) -> None:
+        """Keep the last stable state before an arc length, where the smallest eigenvalue of the tangent is nil: regula falsi (Illinois).
+
+        Known of the state there are that eigenvalue, the load factor, and whether the load falls.
+        """
         low, high = 0.0, arc
         value = start = here.tangent.smallest
-        beyond, beyond_factor, falls = there.tangent.smallest, there.state.factor, self._falls(there, taken)
+        beyond, beyond_factor, falls = known
         last: tuple[LoadedState, int, float] | None = None  # without its tangent, which takes much memory
         last_factor = here.state.factor
         kept: bool | None = None

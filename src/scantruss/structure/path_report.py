@@ -9,7 +9,7 @@ from ..runtime.ours import MARK
 from .nonlinear import CUTS, PATH_STEPS, Path
 from .truss import Truss
 
-SECONDS = 4e-5  #: of a step for each displacement of a node, on a usual machine
+SECONDS = 3e-5  #: of a step for each displacement of a node, on a usual machine
 GROWS = 1.2  #: power of the displacements by which this grows
 EXTRA_STEPS = 10  #: that a path needs to find where stability is lost
 
@@ -52,9 +52,9 @@ def path_warnings(path: Path) -> list[str]:
     """Return what is to be known about a path."""
     said = []
     if path.kind == "bifurcation":
+        advice = "a larger imperfection" if path.imperfection.kind == "mode" else "an imperfection, such as mode"
         said.append(
-            f"the path passes a bifurcation at the factor {path.limit_factor:.4g}: the structure leaves it there; take an"
-            " imperfection, such as mode"
+            f"the path passes a bifurcation at the factor {path.limit_factor:.4g}: the structure leaves it there; take {advice}"
         )
     if path.limit_factor is not None and path.limit_factor < 1:
         said.append(
@@ -72,7 +72,7 @@ def path_expectation(truss: Truss, steps: int = PATH_STEPS) -> str:
     time = f"{max(seconds, 1):.0f} s" if seconds < 90 else f"{seconds / 60:.0f} min"
     return (
         f"{len(truss.nodes):,} nodes, {len(truss.members):,} members, {freedoms:,} displacements: a path of {steps} steps takes"
-        f" about {time} on a usual machine, twice that for a mode with both signs, up to {2**CUTS:,} shorter steps where it is hard"
+        f" about {time} on a usual machine, up to twice that for a mode with both signs, up to {2**CUTS:,} shorter steps where it is hard"
     )
 
 

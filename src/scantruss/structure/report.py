@@ -270,6 +270,19 @@ def unlisted_lines(report: StructureReport) -> list[str]:
     )
 
 
+def half_lines(report: StructureReport) -> list[str]:
+    """Return a line on the worst half of snow, where there are several."""
+    halves = [case for case in report.cases if case.state == "case" and case.name.startswith("half-snow ")]
+    if len(halves) < 2:
+        return []
+    moved = max(halves, key=lambda case: case.displacement_max)
+    used = max(halves, key=lambda case: case.utilization_max or 0.0)
+    most = f", {used.name} uses the members most, {use_words(used.utilization_max)}" if used.utilization_max else ""
+    return [
+        f"of {len(halves)} halves of snow {moved.name} moves the nodes most, {1e3 * moved.displacement_max:.3g} mm{most}"
+    ]
+
+
 def use_words(utilization: float | None) -> str:
     """Return a utilization in words: of absurd loads only that it is beyond all measure."""
     if utilization is None:
@@ -286,7 +299,10 @@ def mode_lines(report: StructureReport) -> list[str]:
             f"buckling factors of {report.buckling.of}: {factors}" if factors else "no load makes the structure buckle"
         )
     if report.vibration is not None:
-        said.append("natural frequencies: " + ", ".join(f"{value:.4g}" for value in report.vibration.values) + " Hz")
+        values = ", ".join(f"{value:.4g}" for value in report.vibration.values)
+        said.append(
+            f"natural frequencies: {values} Hz" if values else "no node can move, so there are no natural frequencies"
+        )
     if report.path is not None:
         said.append(path_words(report.path))
     return said

@@ -22,7 +22,7 @@ from .frame import (
     stiffness_matrix,
     transforms,
 )
-from .mechanism import refuse_mechanism, softest_motion
+from .mechanism import pivots, refuse_mechanism, softest_motion
 from .ordering import dissected
 from .truss import GRAVITY, LoadCase, Truss
 
@@ -222,7 +222,7 @@ def factor_stiffness(truss: Truss) -> Factored:
     scaled = (scale @ part @ scale).tocsc()
     try:
         factor = splu(scaled, **IN_ORDER)
-        small = float(np.abs(factor.U.diagonal()).min()) < SINGULAR
+        small = float(np.abs(pivots(factor)).min()) < SINGULAR
     except RuntimeError:  # a pivot is nil
         factor, small = None, True
     if small:

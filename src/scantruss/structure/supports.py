@@ -81,6 +81,8 @@ def _nodes_of(truss: Truss, word: str) -> np.ndarray:
     """Return the nodes that one word names."""
     if word.startswith("lowest:"):
         height = quantity(word.removeprefix("lowest:"), LENGTH, "height above the lowest node", plain=True)
+        if height < 0:
+            raise InputError(f"no supports: no node lies below the lowest, got {word}")
         z = truss.nodes[:, 2]
         used = np.zeros(len(z), bool)
         used[truss.members] = True

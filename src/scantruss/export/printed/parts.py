@@ -17,7 +17,7 @@ from ...errors import InputError
 from ...grid.grid import Grid
 from ...grid.marks import member_marks, numbered
 from ...kernels.geometry.components import component_labels
-from ..solid import balls_of, bars_of, check_diameters, unite
+from ..solid import balls_of, bars_of, check_diameters, marked_bars, unite
 from .plates import Bed, PrintedPart
 
 PEG_SIDES = 32
@@ -163,6 +163,8 @@ def build_parts(
         edges = np.where((along < 0)[:, None], edges[:, ::-1], edges)  # from the side with pegs to that with sockets
     balls = balls_of(grid, used, nodes, node / 2, sides, marks)
     whole = bars_of(nodes, edges, member / 2, sides)
+    if marks:
+        whole = marked_bars(grid, nodes, edges, whole, member / 2, node / 2, sides)
     names = numbered("part ", int(part_of.max()) + 1, 1)
     made = []
     for number, name in enumerate(names):

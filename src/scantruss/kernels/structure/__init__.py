@@ -1,0 +1,1 @@
+"""Kernels of structures: forces of members under large displacements."""
