@@ -58,6 +58,7 @@ def quads_of(
     constraints: Constraints,
     settings: Settings,
     *,
+    begin: int = 0,
     progress: Progress | None = None,
 ) -> Grid:
     """Return a grid of quads over the surface of one of triangles.
@@ -70,6 +71,8 @@ def quads_of(
         What it was made with.
     settings : Settings
         `effort`, `rows`.
+    begin : int
+        Number of the first start of rows.
 
     Returns
     -------
@@ -89,7 +92,7 @@ def quads_of(
     mesh = opened(grid)
     coarse, fine = fine_mesh(grid, mesh, 1), fine_mesh(grid, mesh, PARTS)
     guide = principal_directions(mesh, len(coarse.nodes)) if settings.rows == "curvature" else None
-    starts, tried = ROW_STARTS[: STARTS_TRIED[settings.effort]], []
+    starts, tried = ROW_STARTS[begin : begin + STARTS_TRIED[settings.effort]], []
     for number, start in enumerate(starts):
         report(0.6 * number / len(starts))
         first, work = _laid(grid, coarse, fine, start, guide, opened)
@@ -153,7 +156,9 @@ def _laid(
     fixed = np.zeros(len(nodes), np.bool_)
     known = lattice.source < len(grid.nodes)
     fixed[: len(known)][known] = grid.fixed[lattice.source[known]]
-    first = _grid(grid, nodes, quads, fixed, chains)
+    used, quads = np.unique(quads, return_inverse=True)
+    quads, chains = quads.reshape(-1, 4), np.searchsorted(used, chains)
+    first = _grid(grid, nodes[used], quads, fixed[used], chains)
     work = QuadMesh(opened(first), quads, chains)
     for _ in range(2):
         work.settle(FIRST_SWEEPS)
