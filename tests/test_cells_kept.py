@@ -11,8 +11,13 @@ import scantruss as st
 from scantruss.cells.collapse import LatticeMesh
 from scantruss.cells.hexagons import dual_of
 from scantruss.cells.lead import Panels
+from scantruss.cells.row_lengths import row_lengths
+from scantruss.constraints.network import curves_of
 from scantruss.grid.grid import Grid
 from scantruss.grid.panels import inner_angles_of, table_of, triangles_of
+from scantruss.improve.working_mesh import WorkingMesh
+from scantruss.scan.cloud import PointCloud
+from scantruss.surface.samples import sample_surface
 
 LENGTHS = {"quad": 1.5, "hexagon": 1.1}
 
@@ -110,3 +115,21 @@ def test_a_node_between_a_triangle_and_a_quad_goes() -> None:
     panels.lead_all()
     _, found, _, _ = panels.result()
     assert found.shape == (1, 4) and set(found[0].tolist()) == {0, 1, 2, 3}
+
+
+def test_rows_lie_closer_together_only_where_the_boundary_bends() -> None:
+    def lengths(radius: float) -> np.ndarray:
+        turn = np.linspace(0, 2 * np.pi, 80, endpoint=False)
+        ring = radius * np.column_stack([np.cos(turn), np.sin(turn), 0 * turn])
+        center = np.zeros((1, 3))
+        fan = np.array([(80, k, (k + 1) % 80) for k in range(80)])
+        grid = Grid(nodes=np.concatenate([ring, center]), triangles=fan, fixed=np.zeros(81, bool), origin=np.zeros(3))
+        curves = curves_of([ring], [True])
+        surface = sample_surface(PointCloud.from_array(np.concatenate([ring, center])), st.Settings(length=1.0)).surface
+        mesh = WorkingMesh.from_grid(grid, surface, curves, np.zeros((0, 3)), 1.0)
+        return row_lengths(mesh, np.array([(radius, 0, 0), (radius + 1.25, 0, 0), (radius + 5.0, 0, 0)]))
+
+    assert lengths(8.0) == pytest.approx(1.0)
+    close, between, far = lengths(1.6)
+    assert close == pytest.approx((0.055 / (1.6 - (1.6**2 - 0.25) ** 0.5)) ** 0.5, abs=0.02)
+    assert close < between < far == 1.0
