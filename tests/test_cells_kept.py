@@ -14,7 +14,7 @@ from scantruss.cells.lead import Panels
 from scantruss.cells.row_lengths import row_lengths
 from scantruss.constraints.network import curves_of
 from scantruss.grid.grid import Grid
-from scantruss.grid.panels import inner_angles_of, table_of, triangles_of
+from scantruss.grid.panels import inner_angles_of, planarity_of, table_of, triangles_of
 from scantruss.improve.working_mesh import WorkingMesh
 from scantruss.scan.cloud import PointCloud
 from scantruss.surface.samples import sample_surface
@@ -133,3 +133,29 @@ def test_rows_lie_closer_together_only_where_the_boundary_bends() -> None:
     close, between, far = lengths(1.6)
     assert close == pytest.approx((0.055 / (1.6 - (1.6**2 - 0.25) ** 0.5)) ** 0.5, abs=0.02)
     assert close < between < far == 1.0
+
+
+@compiled_only
+def test_quads_of_a_vault_become_planar_near_the_scan_with_even_members() -> None:
+    rng = np.random.default_rng(4)
+    turn, y = rng.uniform(0.0, np.pi, 24_000), rng.uniform(-8.0, 8.0, 24_000)
+    points = np.column_stack([6.0 * np.cos(turn), y, 6.0 * np.sin(turn)])
+    points = points[np.hypot(points[:, 0] - 1.0, points[:, 1]) > 2.0]
+    bent, flat = made("quad", points), made("quad", points, planar=True)
+    assert planarity_of(bent.nodes, bent.panel_table).max() > 0.003
+    assert planarity_of(flat.nodes, flat.panel_table).max() <= 0.003
+    assert np.abs(np.hypot(*flat.scan_nodes[:, [0, 2]].T) - 6.0).max() < 0.1 * LENGTHS["quad"]
+    assert flat.quality.length_cv < 1.2 * bent.quality.length_cv
+    assert np.array_equal(flat.panel_table.shape, bent.panel_table.shape)
+
+
+@compiled_only
+def test_planar_hexagons_stay_hexagons_where_the_surface_is_a_saddle() -> None:
+    points = bowl(False)
+    points[:, 2] = 0.03 * (points[:, 0] ** 2 - points[:, 1] ** 2)
+    bent, flat = made("hexagon", points), made("hexagon", points, planar=True)
+    off = [planarity_of(each.nodes, each.panel_table) for each in (bent, flat)]
+    assert off[1].mean() < off[0].mean() and off[1].max() <= off[0].max() + 1e-9
+    assert inner_angles_of(flat.nodes, flat.panel_table)[flat.panel_table >= 0].max() < 180.0
+    assert flat.quality.length_cv <= 1.2 * bent.quality.length_cv
+    assert flat.certificate is not None and any(w.kind == "plane" for w in flat.certificate.warnings)

@@ -22,7 +22,7 @@ from ..kernels.boundary.curves import nearest_on_curves
 from ..kernels.mesh.grid import AT_REST, INTERIOR, ON_CURVE
 from ..runtime.progress import Progress
 from ..surface.scratch import with_own_scratch
-from .stops import at_stops, slide_back
+from .stops import at_stops, slide_back, ways_along
 
 if TYPE_CHECKING:
     from ..boundary.find import Boundary
@@ -243,20 +243,10 @@ def even_out(mesh: WorkingMesh, grid: Grid, length: float) -> None:
         move *= HEXAGON_STEP * target[:, None]
         move -= (move * normals).sum(axis=1, keepdims=True) * normals
         move[kind >= AT_REST] = 0.0
-        along = _ways_along(nodes, rim)[slides]
+        along = ways_along(nodes, rim)[slides]
         move[slides] = (move[slides] * along).sum(axis=1, keepdims=True) * along
         nodes += move
     slide_back(mesh, count)
-
-
-def _ways_along(nodes: np.ndarray, rim: np.ndarray) -> np.ndarray:
-    """Return a unit vector along the boundary or a line at each of its nodes (V, 3), either way; rim: their members (B, 2)."""
-    nearest, total = np.full(len(nodes), -1), np.zeros_like(nodes)
-    for v, w in (*rim.tolist(), *rim[:, ::-1].tolist()):
-        sign = -1.0 if nearest[v] >= 0 else 1.0
-        nearest[v] = w
-        total[v] += sign * (nodes[w] - nodes[v])
-    return total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-300)
 
 
 def _corners(panels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

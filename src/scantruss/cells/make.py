@@ -12,12 +12,11 @@ from ..check.limits import PLACES_KEPT
 from ..errors import CertificateError
 from ..grid.certificate import Fault, place_of
 from ..grid.grid import Grid
-from ..grid.panels import planarity_of
+from ..grid.panels import PLANAR_ENOUGH, planarity_of
 from ..improve.working_mesh import WorkingMesh
 from ..runtime.progress import Progress
 from ..surface.scratch import with_own_scratch
 from .hexagons import TRIANGLE_MEMBER, hexagons_of
-from .planar import PLANAR_ENOUGH, make_planar
 
 TIMES_ROWS_TRIED = 5  # times that other starts of rows are tried where quads fail the checks
 
@@ -99,6 +98,8 @@ def _judged(
     judged = judging_settings(settings)
     if not settings.planar:
         return certified(made.replace(settings=settings), samples, boundary, judged)
+    from .planar import make_planar  # needs scipy, which other grids do not load
+
     surface = with_own_scratch(samples.surface)
     lines, length = constraints.lines, settings.length
     mesh = WorkingMesh.from_grid(made, surface, boundary.curves, boundary.stops, length, lines)

@@ -35,3 +35,13 @@ def slide_back(mesh: WorkingMesh, count: int) -> None:
         reach = 0.5 * mesh.length * net.desired[v]
         net.arc[v], *place = slide(mesh.curves, net.curve[v], net.arc[v], reach, *net.nodes[v].tolist())
         net.nodes[v] = place
+
+
+def ways_along(nodes: np.ndarray, rim: np.ndarray) -> np.ndarray:
+    """Return a unit vector along the boundary or a line at each of its nodes (V, 3), either way; rim: their members (B, 2)."""
+    nearest, total = np.full(len(nodes), -1), np.zeros_like(nodes)
+    for v, w in (*rim.tolist(), *rim[:, ::-1].tolist()):
+        sign = -1.0 if nearest[v] >= 0 else 1.0
+        nearest[v] = w
+        total[v] += sign * (nodes[w] - nodes[v])
+    return total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-300)

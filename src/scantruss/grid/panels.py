@@ -11,6 +11,8 @@ CELL_NAMES = {
 }  # what panels of each kind of cells are called
 REGULAR_MEMBERS = {4: 4, 5: 3}  # members at a regular node inside, by the most nodes of a panel: of quads, of more
 
+PLANAR_ENOUGH = 0.003  # distance of a corner from its panel's mean plane below which it is planar [mean diagonals]
+
 
 def loops_of(panels: np.ndarray) -> list[list[int]]:
     """Return the nodes of each panel of a table (P, K) that is filled up with -1."""
