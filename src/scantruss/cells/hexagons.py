@@ -1,6 +1,7 @@
 """Grids of hexagons: the dual of a grid of triangles, a node on the scan for each triangle, evened out.
 
-The boundary is closed by a node on each member of the triangles' boundary, and by their corners.
+The boundary is closed by a node on each member of the triangles' boundary, and by their corners. Lines cut the panels in the same way
+and so become chains of members.
 """
 
 from __future__ import annotations
@@ -10,15 +11,18 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ..constraints.fixed_nodes import check_positions
 from ..errors import FrontError
 from ..grid.grid import Grid
 from ..grid.panels import sides_of, sizes_of, table_of, triangles_of
 from ..improve.optimize import project_onto_scan
+from ..improve.sliding_nodes import with_boundary_members, with_line_sets
 from ..improve.working_mesh import WorkingMesh
-from ..kernels.mesh.grid import AT_REST
+from ..kernels.boundary.curves import nearest_on_curves
+from ..kernels.mesh.grid import AT_REST, INTERIOR, ON_CURVE
 from ..runtime.progress import Progress
 from ..surface.scratch import with_own_scratch
-from .stops import at_stops, slide_back
+from .stops import at_stops, slide_back, ways_along
 
 if TYPE_CHECKING:
     from ..boundary.find import Boundary
@@ -29,6 +33,9 @@ if TYPE_CHECKING:
 TRIANGLE_MEMBER = 3.0**0.5  # member of the triangles whose dual has members of 1
 HEXAGON_ROUNDS, HEXAGON_STEPS = 12, 12  # times that nodes return to the scan, and steps between
 HEXAGON_ANGLES = 0.35  # weight of the angles, 120 degrees, against the lengths
+ON_SEAM = (
+    0.25  # distance of a fixed position from the boundary or a line up to which one of its nodes goes there [members]
+)
 HEXAGON_STEP = 0.22  # of the step to the least energy of a node whose neighbours rest
 
 
@@ -37,7 +44,7 @@ class Dual(NamedTuple):
 
     nodes: np.ndarray  #: (V, 3) [scan unit]
     panels: np.ndarray  #: (P, K) int64, filled up with -1
-    fixed: np.ndarray  #: (V,) bool, nodes at corners
+    lines: np.ndarray  #: (K, 2) members along lines, not on the boundary
 
 
 def hexagons_of(
@@ -74,16 +81,21 @@ def hexagons_of(
     report(0.0)
     if not (grid.topology.manifold and grid.topology.orientable):
         raise FrontError("the grid is no oriented manifold of triangles, which hexagons are made of", grid)
+    positions = check_positions(settings.fixed, samples, settings.length)
     grid = at_stops(grid, boundary.stops, settings.length)
-    dual = dual_of(grid, boundary.stops, 1e-6 * settings.length)
+    grid = at_stops(grid, constraints.lines.stops, settings.length, np.unique(grid.lines))
+    corners = np.concatenate([boundary.stops.reshape(-1, 3), constraints.lines.stops])
+    dual = dual_of(grid, corners, 1e-6 * settings.length)
     first = grid.replace(
         nodes=dual.nodes, triangles=triangles_of(dual.nodes, dual.panels), panels=dual.panels,
-        fixed=np.zeros(len(dual.nodes), np.bool_), lines=np.zeros((0, 2), np.int64), line_sets=(), deviation=None, desired=None,
+        fixed=np.zeros(len(dual.nodes), np.bool_), lines=dual.lines, line_sets=(), deviation=None, desired=None,
     )  # fmt: skip
 
     def opened(some: Grid) -> WorkingMesh:
         surface = with_own_scratch(samples.surface)
-        return WorkingMesh.from_grid(some, surface, boundary.curves, boundary.stops, settings.length)
+        return WorkingMesh.from_grid(some, surface, boundary.curves, boundary.stops, settings.length, constraints.lines)
+
+    first = with_fixed_nodes(first, opened(first), positions, settings.length)
 
     mesh, count = opened(first), len(dual.nodes)
     mesh.return_to_scan(1.0)
@@ -100,58 +112,108 @@ def hexagons_of(
         deviation=mesh.deviation()[:count].copy(),
         desired=mesh.length * mesh.net.desired[:count] if mesh.graded else None,
     )
+    made = with_boundary_members(made, constraints.lines, settings.length)
     report(1.0)
-    return made.replace(before=before)
+    return with_line_sets(made, constraints.lines, settings.length).replace(before=before)
+
+
+def with_fixed_nodes(grid: Grid, mesh: WorkingMesh, positions: np.ndarray, length: float) -> Grid:
+    """Return a grid with the nearest node to each position (K, 3) there, of the boundary or a line if it is on one.
+
+    mesh : the grid opened, whose node k is its node k
+    """
+    nodes, fixed, kind = grid.nodes.copy(), grid.fixed.copy(), mesh.net.kind[: len(grid.nodes)]
+    for place in positions:
+        on_curve = len(mesh.curves.total) > 0 and nearest_on_curves(mesh.curves, *place.tolist())[2] < ON_SEAM * length
+        away = np.linalg.norm(nodes - place, axis=1)
+        free = ~fixed & ((kind == ON_CURVE) if on_curve else (kind == INTERIOR))
+        at_corner = np.flatnonzero((kind == AT_REST) & ~fixed & (away < ON_SEAM * length))
+        v = at_corner[0] if len(at_corner) else int(np.where(free, away, np.inf).argmin())
+        nodes[v], fixed[v] = place, True
+    return grid.replace(nodes=nodes, fixed=fixed)
 
 
 def dual_of(grid: Grid, corners: np.ndarray, near: float) -> Dual:
-    """Return the dual of a grid of triangles.
+    """Return the dual of a grid of triangles, cut along its boundary and lines by a node on each of their members.
 
     Parameters
     ----------
     grid : Grid
         An oriented manifold of triangles.
-    corners : (K, 3) places at which nodes of its boundary become nodes
+    corners : (K, 3) places at which nodes of its boundary and lines become nodes
     near : distance within which they do [scan unit]
     """
     triangles, count = grid.triangles, len(grid.triangles)
-    boundary_members = np.flatnonzero(grid.edge_uses == 1)
-    of_boundary_member = {int(edge): count + number for number, edge in enumerate(boundary_members.tolist())}
-    middles = grid.nodes[triangles].mean(axis=1)
-    middles_of_members = grid.nodes[grid.edges[boundary_members]].mean(axis=1)
-    boundary_nodes = np.unique(grid.edges[boundary_members])
-    at_corner = np.array(
-        [len(corners) > 0 and np.linalg.norm(corners - grid.nodes[v], axis=1).min() <= near for v in boundary_nodes]
-    )
-    kept = boundary_nodes[at_corner] if len(boundary_nodes) else boundary_nodes
-    own = {int(v): count + len(boundary_members) + number for number, v in enumerate(kept.tolist())}
+    seam = (grid.edge_uses == 1) | grid.edge_on_line
+    seams = np.flatnonzero(seam)
+    on_seam = {edge: count + number for number, edge in enumerate(seams.tolist())}
+    kept = _kept_nodes(grid, seams, corners, near)
+    own = {v: count + len(seams) + number for number, v in enumerate(kept)}
     sides = grid.half_edge_edges.reshape(3, -1).T
-    after: list[dict[int, int]] = [{} for _ in grid.nodes]  # at each node: from member to member, over a triangle
-    over: list[dict[int, int]] = [{} for _ in grid.nodes]
+    after: list[dict[int, tuple[int, int]]] = [
+        {} for _ in grid.nodes
+    ]  # at each node: triangle after a member, member after that
     for t, (corner, side) in enumerate(zip(triangles.tolist(), sides.tolist(), strict=True)):
         for k in range(3):
-            after[corner[k]][side[k]] = side[k - 1]
-            over[corner[k]][side[k]] = t
-    loops = []
+            after[corner[k]][side[k]] = (t, side[k - 1])
+    loops, lines = [], []
     for v, following in enumerate(after):
         if not following:
             continue
-        starts = set(following) - set(following.values())
-        edge = starts.pop() if starts else min(following)
-        loop = [of_boundary_member[edge]] if edge in of_boundary_member else []
-        for _ in range(len(following)):
-            loop.append(over[v][edge])
-            edge = following[edge]
-        if edge in of_boundary_member:
-            loop.append(of_boundary_member[edge])
-            if v in own:
-                loop.append(own[v])
-        if len(loop) > 2:
-            loops.append(loop)
-    nodes = np.concatenate([middles, middles_of_members, grid.nodes[kept]])
-    fixed = np.zeros(len(nodes), np.bool_)
-    fixed[count + len(boundary_members) :] = True
-    return Dual(nodes, table_of(loops), fixed)
+        mine = [own[v]] if v in own else []
+        sectors = _sectors(following, on_seam)
+        if len(sectors) == 1 and sectors[0].first == sectors[0].last and mine:
+            loops += _around_end(mine[0], sectors[0])
+        else:
+            loops += [loop for sector in sectors if len(loop := [*mine, *sector.nodes]) > 2]
+        inner = sorted({at for sector in sectors for at in (sector.first, sector.last) if at >= 0})
+        inner = [at for at in inner if grid.edge_uses[seams[at - count]] == 2]
+        lines += [(mine[0], at) for at in inner] if mine else [(inner[0], inner[1])] if len(inner) == 2 else []
+    middles = grid.nodes[triangles].mean(axis=1)
+    nodes = np.concatenate([middles, grid.nodes[grid.edges[seams]].mean(axis=1), grid.nodes[kept]])
+    return Dual(nodes, table_of(loops), np.unique(np.sort(np.array(lines, np.int64).reshape(-1, 2), axis=1), axis=0))
+
+
+class Sector(NamedTuple):
+    """What lies at a node between two members of the boundary or a line, or all around it."""
+
+    first: int  #: node of the dual on the one member, -1 all around
+    nodes: list[int]  #: those of the panel, both on the members among them
+    last: int
+
+
+def _sectors(following: dict[int, tuple[int, int]], on_seam: dict[int, int]) -> list[Sector]:
+    """Return the sectors at a node; following: triangle and member after each member around it."""
+    starts = set(following) - {edge for _, edge in following.values()}
+    cuts = [edge for edge in following if edge in on_seam]
+    edge = starts.pop() if starts else min(cuts or following)
+    found, nodes, first = [], [], on_seam.get(edge, -1)
+    for _ in range(len(following)):
+        t, edge = following[edge]
+        nodes.append(t)
+        if edge in on_seam:
+            last = on_seam[edge]
+            found.append(Sector(first, [first, *nodes, last] if first != last else [first, *nodes], last))
+            nodes, first = [], last
+    return [*found, Sector(-1, nodes, -1)] if nodes else found
+
+
+def _around_end(end: int, around: Sector) -> list[list[int]]:
+    """Return three panels around the end of a line, from which two members more go on."""
+    on_line, *ring = around.nodes
+    i = len(ring) // 2
+    j = len(ring) + 1 - i
+    return [[end, on_line, *ring[:i]], [end, *ring[i - 1 : j]], [end, *ring[j - 1 :], on_line]]
+
+
+def _kept_nodes(grid: Grid, seams: np.ndarray, corners: np.ndarray, near: float) -> list[int]:
+    """Return the nodes that stay nodes: at corners, and where other than two members of the boundary and lines meet."""
+    meeting = np.bincount(grid.edges[seams].ravel(), minlength=len(grid.nodes))
+    kept = set(np.flatnonzero((meeting > 0) & (meeting != 2)).tolist())
+    for v in np.flatnonzero(meeting == 2).tolist():
+        if len(corners) and np.linalg.norm(corners - grid.nodes[v], axis=1).min() <= near:
+            kept.add(v)
+    return sorted(kept)
 
 
 def even_out(mesh: WorkingMesh, grid: Grid, length: float) -> None:
@@ -160,15 +222,19 @@ def even_out(mesh: WorkingMesh, grid: Grid, length: float) -> None:
     nodes, kind = net.nodes[:count], net.kind[:count]
     target = length * net.desired[:count]
     a, b = grid.edges.T
+    seam = (grid.edge_uses == 1) | grid.edge_on_line
+    usual = np.where(seam, TRIANGLE_MEMBER, 1.0)
     panels = grid.panel_table
     before, after = _corners(panels)
     normals = mesh.patches[:count, 3:6]
     at_boundary = np.zeros(count, np.bool_)
-    at_boundary[grid.edges[grid.edge_uses == 1].ravel()] = True
+    rim = grid.edges[seam]
+    at_boundary[rim.ravel()] = True
+    slides = np.flatnonzero(kind == ON_CURVE)
     for _ in range(HEXAGON_STEPS):
         way = nodes[b] - nodes[a]
         size = np.linalg.norm(way, axis=1, keepdims=True)
-        wanted = 0.5 * (target[a] + target[b])[:, None]
+        wanted = (0.5 * usual * (target[a] + target[b]))[:, None]
         pull = (size / wanted - 1.0) * way / np.maximum(size, 1e-12 * wanted)
         move = np.zeros_like(nodes)
         np.add.at(move, a, pull)
@@ -177,6 +243,8 @@ def even_out(mesh: WorkingMesh, grid: Grid, length: float) -> None:
         move *= HEXAGON_STEP * target[:, None]
         move -= (move * normals).sum(axis=1, keepdims=True) * normals
         move[kind >= AT_REST] = 0.0
+        along = ways_along(nodes, rim)[slides]
+        move[slides] = (move[slides] * along).sum(axis=1, keepdims=True) * along
         nodes += move
     slide_back(mesh, count)
 

@@ -7,7 +7,7 @@ import heapq
 import numpy as np
 
 from .collapse import LatticeMesh
-from .fine_mesh import ALONG
+from .fine_mesh import ALONG, FREE
 from .pairing import squareness
 
 THROUGH_LINE = 6.0  # what a line in the way costs, which gets a node more, against a quad
@@ -87,7 +87,12 @@ class Panels:
             k = own.index(a)
             own = own[k:] + own[:k]  # a, b, tip
             tip = own[2]
-            barrier = to < 0 or (min(a, b), max(a, b)) in self.chains
+            between = self._between(p, to) if to >= 0 else -1
+            if between >= 0 and self.held[between] == FREE:
+                self._drop(between, p, to)
+                self._lead(to)  # ends: panels are one fewer
+                return
+            barrier = between >= 0 or (min(a, b), max(a, b)) in self.chains
             if to < 0:
                 self._leave(p)
                 self._enter(p, [a, self._split(a, b), b, tip])
@@ -119,6 +124,19 @@ class Panels:
             self._enter(kept, quad)
             self._enter(to, triangle)
             p = to
+
+    def _between(self, p: int, to: int) -> int:
+        """Return the node that a triangle and a quad have to themselves because they share two sides; -1 for none."""
+        other = self.corners[to]
+        away = [v for v in other if v not in self.corners[p]]
+        return other[other.index(away[0]) - 2] if len(other) == 4 and len(away) == 1 else -1
+
+    def _drop(self, between: int, p: int, to: int) -> None:
+        """Make one triangle of a triangle and a quad without the node between them."""
+        self._leave(p)
+        self._leave(to)
+        self.corners[p] = []
+        self._enter(to, [v for v in self.corners[to] if v != between])
 
     def _cut(self, ring: list[int], after: tuple[int, int]) -> tuple[list[int], list[int]]:
         """Cut five corners into a triangle that has an edge and the rest, as square as may be."""

@@ -9,15 +9,16 @@ import numpy as np
 
 from ..check.certify import certified
 from ..check.limits import PLACES_KEPT
-from ..constraints.network import NO_LINES
+from ..errors import CertificateError
 from ..grid.certificate import Fault, place_of
 from ..grid.grid import Grid
-from ..grid.panels import planarity_of
+from ..grid.panels import PLANAR_ENOUGH, planarity_of
 from ..improve.working_mesh import WorkingMesh
 from ..runtime.progress import Progress
 from ..surface.scratch import with_own_scratch
 from .hexagons import TRIANGLE_MEMBER, hexagons_of
-from .planar import PLANAR_ENOUGH, make_planar
+
+TIMES_ROWS_TRIED = 5  # times that other starts of rows are tried where quads fail the checks
 
 if TYPE_CHECKING:
     from ..boundary.find import Boundary
@@ -32,7 +33,7 @@ def settings_of_triangles(settings: Settings) -> Settings:
         return settings.replace(effort="quick")
     if settings.cells == "hexagon":
         closed = settings.closed_boundary_length
-        return settings.replace(length=TRIANGLE_MEMBER * settings.length, fill_holes=closed)
+        return settings.replace(length=TRIANGLE_MEMBER * settings.length, fill_holes=closed, fixed=[])
     return settings
 
 
@@ -72,16 +73,36 @@ def with_cells(
     """
     if settings.cells == "triangle":
         return grid
-    from .quads import quads_of  # needs scipy, which other grids do not load
+    if settings.cells == "hexagon":
+        made = hexagons_of(grid, samples, boundary, constraints, settings, progress=progress)
+        return _judged(made, samples, boundary, constraints, settings)
+    from .quads import ROW_STARTS, STARTS_TRIED, quads_of  # needs scipy, which other grids do not load
 
-    make = quads_of if settings.cells == "quad" else hexagons_of
-    made = make(grid, samples, boundary, constraints, settings, progress=progress)
+    first: CertificateError | None = None
+    for begin in range(
+        0, min(len(ROW_STARTS), TIMES_ROWS_TRIED * STARTS_TRIED[settings.effort]), STARTS_TRIED[settings.effort]
+    ):
+        made = quads_of(grid, samples, boundary, constraints, settings, begin=begin, progress=progress)
+        try:
+            return _judged(made, samples, boundary, constraints, settings)
+        except CertificateError as error:
+            first = first or error
+    assert first is not None
+    raise first
+
+
+def _judged(
+    made: Grid, samples: SurfaceSamples, boundary: Boundary, constraints: Constraints, settings: Settings
+) -> Grid:
+    """Return a grid of cells, made planar if that is wanted, with its certificate."""
     judged = judging_settings(settings)
     if not settings.planar:
         return certified(made.replace(settings=settings), samples, boundary, judged)
+    from .planar import make_planar  # needs scipy, which other grids do not load
+
     surface = with_own_scratch(samples.surface)
-    lines = constraints.lines if settings.cells == "quad" else NO_LINES
-    mesh = WorkingMesh.from_grid(made, surface, boundary.curves, boundary.stops, settings.length, lines)
+    lines, length = constraints.lines, settings.length
+    mesh = WorkingMesh.from_grid(made, surface, boundary.curves, boundary.stops, length, lines)
     flat = make_planar(mesh, made)
     flat = flat.replace(deviation=mesh.deviation()[: len(made.nodes)].copy(), desired=made.desired, before=made.quality)
     found = certified(flat.replace(settings=settings), samples, boundary, judged)

@@ -113,6 +113,10 @@ class QuadMesh:
         )  # fmt: skip
         return out
 
+    def mean_energy(self) -> float:
+        """Return the mean energy of a quad."""
+        return float(self.energies(self.live()).mean())
+
     def _enter(self, nodes: Iterable[int]) -> None:
         """Enter the quads at some nodes into the net."""
         net = self.net

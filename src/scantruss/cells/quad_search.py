@@ -31,12 +31,12 @@ class Made(NamedTuple):
 
 
 class Search:
-    """A round of the search over a mesh of quads."""
+    """The search over a mesh of quads; what was tried in a round is tried again in the next only where the quads have changed."""
 
-    def __init__(self, mesh: QuadMesh, price: float, twice: bool) -> None:
+    def __init__(self, mesh: QuadMesh) -> None:
         self.mesh, self.moves = mesh, Moves(mesh)
-        self.price = price  # energy of a quad more or less
-        self.twice = twice  # whether moves that cost energy are followed by another
+        self.price = 0.0  # energy of a quad more or less
+        self.twice = False  # whether moves that cost energy are followed by another
         self.clock = 0
         self.stamp = [0] * len(mesh.at)  # when each node was last changed
         self.done: dict[tuple[int | str, ...], int] = {}  # when each move was last tried
@@ -125,13 +125,16 @@ class Search:
                     any(self.try_move(move) for move in moves.splits(w))
 
 
-def search_once(mesh: QuadMesh, *, twice: bool) -> float:
+def search_once(search: Search, *, twice: bool) -> float:
     """Try the moves at all irregular nodes once and settle; returns the mean energy of a quad.
 
     twice : whether moves that cost energy are followed by another
     """
-    price = float(min(mesh.energies(mesh.live()).mean(), MOST_PRICE))
-    Search(mesh, price, twice).run()
+    mesh = search.mesh
+    if twice != search.twice:
+        search.done.clear()
+    search.twice, search.price = twice, min(mesh.mean_energy(), MOST_PRICE)
+    search.run()
     mesh.renew(RENEWED_IN_SEARCH)
     mesh.settle(SWEEPS_AFTER_ROUND)
-    return float(mesh.energies(mesh.live()).mean())
+    return mesh.mean_energy()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -20,7 +21,8 @@ from .fine_mesh import FineMesh, fine_mesh
 from .lead import Panels
 from .pairing import pairs_of
 from .quad_mesh import QuadMesh
-from .quad_search import search_once
+from .quad_search import Search, search_once
+from .row_lengths import row_lengths
 from .rows import Guide, RowStart, find_rows, lattice_places, offsets_of_edges, principal_directions, spread_rows
 from .stops import at_stops
 
@@ -32,20 +34,20 @@ if TYPE_CHECKING:
 
 ROW_STARTS = (
     RowStart(3.0, 6.0),
-    RowStart(1.5, 2.0),
+    RowStart(1.5, 2.0, bent=True),
     RowStart(0.7, 1.0),
-    RowStart(3.0, 0.5),
+    RowStart(3.0, 0.5, bent=True),
     RowStart(0.7, 4.0),
-    RowStart(0.3, 0.3),
+    RowStart(0.3, 0.3, bent=True),
     RowStart(6.0, 3.0),
-    RowStart(1.5, 8.0),
+    RowStart(1.5, 8.0, bent=True),
     RowStart(3.0, 2.0),
-    RowStart(0.3, 2.0),
+    RowStart(0.3, 2.0, bent=True),
 )
 STARTS_TRIED = {"quick": 1, "normal": 4, "best": 10}  # of them, for each effort
-LEFT_AFTER_ROUND = {"quick": (1,), "normal": (2, 1), "best": (5, 2)}  # starts that are searched on after each round
+LEFT_BEFORE_ROUND = {"quick": (1,), "normal": (3, 1), "best": (10, 5, 2)}  # starts that are searched in each round
 MOST_ROUNDS = {"quick": 2, "normal": 6, "best": 12}  # of the search
-LEAST_FALL = 0.005  # share of the energy that a round must gain for another to follow
+LEAST_FALL = 0.01  # share of the energy that a round must gain for another to follow
 PARTS = 3  # pieces that a member of the triangles becomes in the fine mesh
 FIRST_SWEEPS, LAST_SWEEPS_OF_QUADS = 60, 60  # most sweeps before the search and in the end
 FIRST_NEAR, LAST_NEAR = 0.4, 0.2  # distance of a node from the centre of its patch that gets it a new one [members]
@@ -58,6 +60,7 @@ def quads_of(
     constraints: Constraints,
     settings: Settings,
     *,
+    begin: int = 0,
     progress: Progress | None = None,
 ) -> Grid:
     """Return a grid of quads over the surface of one of triangles.
@@ -70,6 +73,8 @@ def quads_of(
         What it was made with.
     settings : Settings
         `effort`, `rows`.
+    begin : int
+        Number of the first start of rows.
 
     Returns
     -------
@@ -88,13 +93,15 @@ def quads_of(
     grid = at_stops(grid, boundary.stops, settings.length)
     mesh = opened(grid)
     coarse, fine = fine_mesh(grid, mesh, 1), fine_mesh(grid, mesh, PARTS)
+    closer = [replace(each, length=each.length * row_lengths(mesh, each.nodes)) for each in (coarse, fine)]
     guide = principal_directions(mesh, len(coarse.nodes)) if settings.rows == "curvature" else None
-    starts, tried = ROW_STARTS[: STARTS_TRIED[settings.effort]], []
+    starts, tried = ROW_STARTS[begin : begin + STARTS_TRIED[settings.effort]], []
     for number, start in enumerate(starts):
-        report(0.6 * number / len(starts))
-        first, work = _laid(grid, coarse, fine, start, guide, opened)
+        report(0.5 * number / len(starts))
+        on = closer if start.bent else (coarse, fine)
+        first, work = _laid(grid, on[0], on[1], start, guide, opened)
         before = work.grid(first).quality
-        tried.append(_Tried(search_once(work, twice=False), number, first, work, before))
+        tried.append(_Tried(work.mean_energy(), number, first, work, before))
     _, _, first, work, before = _best_of(tried, settings.effort, report)
     work.renew(LAST_NEAR)
     work.settle(LAST_SWEEPS_OF_QUADS)
@@ -123,16 +130,16 @@ class _Tried(NamedTuple):
 
 
 def _best_of(tried: list[_Tried], effort: str, report: Callable[[float], None]) -> _Tried:
-    """Return the best of some starts that have been searched once: fewer of them are searched on after each round."""
-    left, fallen = LEFT_AFTER_ROUND[effort], True
-    for number in range(1, MOST_ROUNDS[effort]):
-        report(0.6 + 0.3 * number / MOST_ROUNDS[effort])
-        tried = sorted(tried, key=lambda each: each[:2])[: left[min(number, len(left)) - 1]]
-        if not fallen:
-            break
+    """Return the best of some starts after a search: fewer of them are searched in each round."""
+    left, searches = LEFT_BEFORE_ROUND[effort], {each.number: Search(each.work) for each in tried}
+    for number in range(MOST_ROUNDS[effort]):
+        report(0.5 + 0.4 * number / MOST_ROUNDS[effort])
+        tried = sorted(tried, key=lambda each: each[:2])[: left[min(number, len(left) - 1)]]
         last = tried[0].energy
-        tried = [each._replace(energy=search_once(each.work, twice=effort != "quick")) for each in tried]
-        fallen = min(tried, key=lambda each: each[:2]).energy < (1.0 - LEAST_FALL) * last
+        twice = number > 0 and effort != "quick"
+        tried = [each._replace(energy=search_once(searches[each.number], twice=twice)) for each in tried]
+        if min(tried, key=lambda each: each[:2]).energy > (1.0 - LEAST_FALL) * last:
+            break
     return min(tried, key=lambda each: each[:2])
 
 
@@ -153,7 +160,9 @@ def _laid(
     fixed = np.zeros(len(nodes), np.bool_)
     known = lattice.source < len(grid.nodes)
     fixed[: len(known)][known] = grid.fixed[lattice.source[known]]
-    first = _grid(grid, nodes, quads, fixed, chains)
+    used, quads = np.unique(quads, return_inverse=True)
+    quads, chains = quads.reshape(-1, 4), np.searchsorted(used, chains)
+    first = _grid(grid, nodes[used], quads, fixed[used], chains)
     work = QuadMesh(opened(first), quads, chains)
     for _ in range(2):
         work.settle(FIRST_SWEEPS)

@@ -42,6 +42,7 @@ class RowStart(NamedTuple):
 
     directions: float
     lattice: float
+    bent: bool = False  #: whether rows lie closer together where the boundary bends within a member
 
 
 @dataclass(frozen=True, eq=False)

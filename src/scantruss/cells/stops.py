@@ -12,16 +12,19 @@ from ..kernels.mesh.grid import ON_CURVE
 AT_STOP = 0.6  # distance up to which a node of the boundary is that of a corner [members]
 
 
-def at_stops(grid: Grid, stops: np.ndarray, length: float) -> Grid:
-    """Return a grid whose nodes at corners and ends of lines lie where these are on the boundary curve, which projection left."""
-    boundary_nodes = np.unique(grid.edges[grid.edge_uses == 1])
-    if not len(stops) or not len(boundary_nodes):
+def at_stops(grid: Grid, stops: np.ndarray, length: float, some: np.ndarray | None = None) -> Grid:
+    """Return a grid whose nodes at corners and ends of lines lie where these are on the curve, which projection left.
+
+    some : nodes that may, those of the boundary if not given
+    """
+    some = np.unique(grid.edges[grid.edge_uses == 1]) if some is None else some
+    if not len(stops) or not len(some):
         return grid
     nodes = grid.nodes.copy()
     for place in stops:
-        away = np.linalg.norm(grid.nodes[boundary_nodes] - place, axis=1)
+        away = np.linalg.norm(grid.nodes[some] - place, axis=1)
         if away.min() < AT_STOP * length:
-            nodes[boundary_nodes[away.argmin()]] = place
+            nodes[some[away.argmin()]] = place
     return grid.replace(nodes=nodes)
 
 
@@ -32,3 +35,13 @@ def slide_back(mesh: WorkingMesh, count: int) -> None:
         reach = 0.5 * mesh.length * net.desired[v]
         net.arc[v], *place = slide(mesh.curves, net.curve[v], net.arc[v], reach, *net.nodes[v].tolist())
         net.nodes[v] = place
+
+
+def ways_along(nodes: np.ndarray, rim: np.ndarray) -> np.ndarray:
+    """Return a unit vector along the boundary or a line at each of its nodes (V, 3), either way; rim: their members (B, 2)."""
+    nearest, total = np.full(len(nodes), -1), np.zeros_like(nodes)
+    for v, w in (*rim.tolist(), *rim[:, ::-1].tolist()):
+        sign = -1.0 if nearest[v] >= 0 else 1.0
+        nearest[v] = w
+        total[v] += sign * (nodes[w] - nodes[v])
+    return total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-300)

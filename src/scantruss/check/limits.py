@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import Place
 from ..grid.certificate import Certificate, Fault, place_of
+from ..grid.panels import inner_angles_of
 from ..settings import CheckSettings
 from .folds import fold_angles
 
@@ -19,7 +20,9 @@ if TYPE_CHECKING:
     from .distances import Distances
 
 WARN_ANGLE = 25.0  # angle of a triangle below which it is poor [degree]
+WARN_WIDE = 150.0  # angle within a panel of more than three nodes above which it is poor [degree]
 WARN_SHORT, WARN_LONG = 0.6, 1.6  # members below and above which they are poor [desired lengths]
+HEXAGON_RIM = 3.0**0.5  # members of the boundary of even hexagons [desired lengths]
 WARN_FOLD = 45.0  # angle between neighbouring triangles below which the fold is poor [degree]
 WARN_OFFSET = 0.05  # distance of a node from the scan, beyond its noise, from which on that is poor [member lengths]
 NOISES_OFF = 3.0  # rms distances of points from their plane that are noise
@@ -76,7 +79,8 @@ def _figures(grid: Grid, found: Distances, settings: Settings) -> list[Figure]:
     angles = np.where((grid.fixed[panels] | (panels < 0)).all(axis=1)[:, None], np.nan, grid.corner_angles)
     shapeable = np.isfinite(angles)
     corners = grid.nodes[panels[shapeable]] + grid.origin
-    folds = fold_angles(grid)
+    inner = _inner_angles(grid)
+    folds, hexagons = fold_angles(grid), grid.cells == "hexagon"
     measured = np.isfinite(found.nodes) & ~grid.fixed
     if settings.boundary:  # its nodes lie where the user says
         measured[grid.edges[grid.edge_uses == 1]] = False
@@ -84,14 +88,29 @@ def _figures(grid: Grid, found: Distances, settings: Settings) -> list[Figure]:
     return [
         Figure("angle", angles[shapeable], corners, settings.min_angle, WARN_ANGLE,
                "has an angle of {:.1f} degrees", largest=False),
+        Figure("wide", inner[np.isfinite(inner)], grid.nodes[panels[np.isfinite(inner)]] + grid.origin,
+               180.0 + settings.min_angle, WARN_WIDE, "has a panel with an angle of {:.0f} degrees"),
         Figure("short", lengths, halves[free], settings.min_length, WARN_SHORT,
                "has a member of {:.2f} desired lengths", largest=False),
-        Figure("long", lengths, halves[free], settings.max_length, WARN_LONG, "has a member of {:.2f} desired lengths"),
+        Figure("long", lengths, halves[free], settings.max_length, WARN_LONG * (HEXAGON_RIM if hexagons else 1.0),
+               "has a member of {:.2f} desired lengths"),
         Figure("folded", folds[np.isfinite(folds)], halves[np.isfinite(folds)], settings.min_fold, WARN_FOLD,
                "is folded to {:.1f} degrees", largest=False),
         Figure("offset", off, grid.nodes[measured] + grid.origin, settings.max_offset, WARN_OFFSET,
                "has a node {:.2f} members off the scan, its noise aside"),
     ]  # fmt: skip
+
+
+def _inner_angles(grid: Grid) -> np.ndarray:
+    """Return the angles within panels of more than three nodes (P, K), NaN where none is judged: corners of the scan cut hexagons."""
+    if grid.cells == "triangle":
+        return np.full(grid.panel_table.shape, np.nan)
+    angles = inner_angles_of(grid.nodes, grid.panel_table)
+    if grid.cells == "hexagon":
+        on_boundary = np.zeros(len(grid.nodes), np.bool_)
+        on_boundary[grid.edges[grid.edge_uses == 1]] = True
+        angles[on_boundary[grid.panel_table]] = np.nan
+    return angles
 
 
 def places_to_look_at(found: Certificate, missed_at: Place) -> list[Fault]:

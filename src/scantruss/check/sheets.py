@@ -59,5 +59,6 @@ def disconnected_place(grid: Grid, samples: SurfaceSamples, nearest: np.ndarray)
     first = np.concatenate([[0], np.cumsum(np.bincount(pairs[:, 0], minlength=len(grid.nodes)))])
     ends = pairs[np.argsort(pairs[:, 0], kind="stable"), 1]
     links, normals = samples.surface.neighbors, samples.surface.normals
-    sample = first_disconnected(links, normals, nearest, first, ends, DISCONNECTED - 1, FEWEST_LINKS)
+    near = max(DISCONNECTED - 1, grid.panel_table.shape[1] // 2 + 1)  # a member more than nodes of one panel
+    sample = first_disconnected(links, normals, nearest, first, ends, near, FEWEST_LINKS)
     return samples.surface.mean[sample] if sample >= 0 else None

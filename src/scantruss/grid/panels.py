@@ -11,6 +11,8 @@ CELL_NAMES = {
 }  # what panels of each kind of cells are called
 REGULAR_MEMBERS = {4: 4, 5: 3}  # members at a regular node inside, by the most nodes of a panel: of quads, of more
 
+PLANAR_ENOUGH = 0.003  # distance of a corner from its panel's mean plane below which it is planar [mean diagonals]
+
 
 def loops_of(panels: np.ndarray) -> list[list[int]]:
     """Return the nodes of each panel of a table (P, K) that is filled up with -1."""
@@ -62,10 +64,14 @@ def triangles_of(nodes: np.ndarray, panels: np.ndarray) -> np.ndarray:
         second = np.where(other, panels[:, [1, 2, 3]], panels[:, [0, 2, 3]])
         return np.stack([first, second], axis=1).reshape(-1, 3)
     found = []
+    taken = {(min(a, b), max(a, b)) for a, b in sides_of(panels).tolist()}  # two panels may share a node of two members
     for loop in loops_of(panels):
         while len(loop) > 3:  # each turn takes a node away
             ends = np.linalg.norm(nodes[np.roll(loop, 1)] - nodes[np.roll(loop, -1)], axis=1)
+            cuts = [(min(pair), max(pair)) for pair in zip(loop[-1:] + loop[:-1], loop[1:] + loop[:1], strict=True)]
+            ends[[cut in taken for cut in cuts]] = np.inf
             k = int(ends.argmin())
+            taken.add(cuts[k])
             found.append([loop[k - 1], loop[k], loop[(k + 1) % len(loop)]])
             del loop[k]
         found.append(loop)
@@ -93,6 +99,16 @@ def corner_angles_of(nodes: np.ndarray, panels: np.ndarray) -> np.ndarray:
     across = np.linalg.norm(np.cross(e, f), axis=2)
     angles: np.ndarray = np.degrees(np.arctan2(across, (e * f).sum(axis=2)))
     return np.where(panels >= 0, angles, np.nan)
+
+
+def inner_angles_of(nodes: np.ndarray, panels: np.ndarray) -> np.ndarray:
+    """Return the angle within the panel at each of its corners (P, K), above 180 where it is hollow, NaN where there is none [degree]."""
+    angles, normal = corner_angles_of(nodes, panels), area_vectors_of(nodes, panels)
+    size, column = sizes_of(panels)[:, None], np.arange(panels.shape[1])[None]
+    after = np.take_along_axis(panels, np.where(column + 1 < size, column + 1, 0), axis=1)
+    before = np.take_along_axis(panels, np.where(column > 0, column - 1, size - 1), axis=1)
+    turn = np.cross(nodes[after] - nodes[panels], nodes[before] - nodes[panels])
+    return np.where((turn * normal[:, None]).sum(axis=2) < 0.0, 360.0 - angles, angles)
 
 
 def side_lengths_of(nodes: np.ndarray, panels: np.ndarray) -> np.ndarray:
