@@ -77,7 +77,6 @@ class LengthBrush:
         self.length = gui.add_text("length there", "", hint="in the unit of the scan; empty: half of the length above")
         self.radius = gui.add_text("radius", "", hint="of a dab, in the unit of the scan; empty: 4 members")
         none = gui.add_button("No field", hint="one length everywhere")
-        self.legend = gui.add_html("")
         paint.on_click(view.step(lambda: setattr(view.click, "value", PAINT_MODE)))
         none.on_click(view.step(lambda: view.session.set("no length field", length_field="")))
         view.modes[PAINT_MODE] = self._click
@@ -115,12 +114,12 @@ class LengthBrush:
         if same and before is not None and before.cloud is state.cloud:
             return
         self.view.scene.remove("/painted")
-        self.legend.content = ""
         if state.cloud is None or not field or isinstance(field, str):
+            self.view.legends.show("painted", "")
             return
         rows = np.array(field, float)
         lengths = rows[:, 3] * settings.length / rows[:, 3].min()
         colors, low, high = colors_of(lengths, None)
         places = SceneFrame.of(state.cloud).to_scene(rows[:, :3])
         self.view.scene.points("/painted", places, colors, PAINTED_SIZE)
-        self.legend.content = legend_of("painted length", state.cloud.unit, low, high, False)
+        self.view.legends.show("painted", legend_of("painted length", state.cloud.unit, low, high, False))

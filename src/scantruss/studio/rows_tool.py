@@ -33,7 +33,7 @@ class RowsTool:
         self._handle: Any = None
         draw.on_click(view.step(self._start))
         none.on_click(view.step(lambda: view.session.set("no arrow", rows_along=())))
-        self.words.on_update(view.step(self._typed))
+        self.words.on_update(view.typed(self._typed))
         view.modes[ROWS_MODE] = self._click
 
     def _start(self) -> None:

@@ -93,7 +93,7 @@ class Guard:
             answer = inner(connection, request)
             if answer is not None:
                 answer.headers["Referrer-Policy"] = "no-referrer"
-                answer.headers["X-SceneFrame-Options"] = "DENY"
+                answer.headers["X-Frame-Options"] = "DENY"
                 if self.token:
                     answer.headers["Set-Cookie"] = f"{COOKIE}={self.token}; HttpOnly; SameSite=Strict; Path=/"
             return answer

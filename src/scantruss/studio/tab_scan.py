@@ -39,7 +39,6 @@ class ScanTab:
         self.unit = gui.add_dropdown("unit", tuple(name or UNKNOWN_UNIT for name in UNITS), initial_value=UNKNOWN_UNIT)
         self.draws = gui.add_checkbox("draw scan", True)
         self.coloring = gui.add_dropdown("colour", SCAN_COLOURINGS)
-        self.legend = gui.add_html("")
         with gui.add_folder("Crop", expand_by_default=False):
             self.crop = CropTool(view, gui)
         self._classes = gui.add_folder("Classes", expand_by_default=False, visible=False)
@@ -102,7 +101,8 @@ class ScanTab:
         state = self.view.session.state
         if state.cloud is None or not self.draws.value:
             self.view.scene.remove_scan()
-            self.legend.content = ""
+            self.view.legends.show("scan", "")
             return
         scale = self.view.scene.scan(state, self.coloring.value, self.view.look.section)
-        self.legend.content = "" if scale is None else legend_of(scale[0], state.cloud.unit, *scale[1:], False)
+        legend = "" if scale is None else legend_of(scale[0], state.cloud.unit, *scale[1:], False)
+        self.view.legends.show("scan", legend)

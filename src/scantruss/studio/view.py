@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from threading import RLock
+from threading import RLock, Timer
 from typing import Any
 
 import numpy as np
@@ -16,6 +16,7 @@ from ..export.page_tables import Tables, tables_of
 from ..structure.build import scale_of
 from .colours import SCAN_COLOURINGS
 from .frame import BESIDE_FIRST, DRAWN_EXTENT, SceneFrame
+from .legends import Legends
 from .outputs import model_to_show
 from .picking import NEAR_ENOUGH, pick
 from .scene import Scene
@@ -38,7 +39,8 @@ NATURAL_VIEW = 0.65  #: of the camera, upright [rad]
 PLAN_VIEW = 0.08  #: the same of a plan, seen from so far that heights hardly matter [rad]
 PLAN_FAR = 1.3  #: of the camera above a plan, so that all of it is seen [distance at which it fills the view]
 PANEL_WIDTH = 452  #: [pixel]
-STEP_NAMES = ("Generate", "Stop", "Undo", "Redo")
+STEP_NAMES = ("Stop", "Undo", "Redo")
+TYPING_PAUSE = 0.6  #: after which what was typed counts [s]
 
 
 class StudioView:
@@ -63,13 +65,13 @@ class StudioView:
             gui.add_html(PANEL_STYLE)
             self.message = gui.add_markdown("")
             self.progress = gui.add_progress_bar(0.0, visible=False)
+            generate = gui.add_button("Generate", color="blue", hint="with the effort that Design says (Ctrl+Enter)")
             self.steps = gui.add_button_group(
-                "steps",
-                STEP_NAMES,
-                hint="Generate with the effort that Design says; what undo and redo would take is said above",
+                "steps", STEP_NAMES, hint="what undo (Ctrl+Z) and redo (Ctrl+Y) would take is said above"
             )
             self.click = gui.add_dropdown("a click", (SELECT,), hint="what a click on the drawing does")
             self.row = gui.add_markdown("", visible=False)
+            self.legends = Legends(gui)
             tabs = gui.add_tab_group()
             with tabs.add_tab("Scan"):
                 self.scan = ScanTab(self, gui)
@@ -86,7 +88,9 @@ class StudioView:
             with tabs.add_tab("Out"):
                 self.files = OutTab(self, gui)
             self.click.options = self.clicks
-            self.steps.on_click(self.step(lambda: self._step(self.steps.value)))  # before anybody can click
+            generate.on_click(self.step(session.generate))  # before anybody can click
+            self.steps.on_click(self.step(lambda: self._step(self.steps.value)))
+            self._add_keys(gui)
         self.tabs = (self.design, self.constraints, self.structure, self.look, self.scan, self.compare, self.files)
         client.scene.on_click()(self._clicked)
         self._end = session.listen(self.update)
@@ -119,6 +123,21 @@ class StudioView:
             self.session.message = "" if not self.session.stage else self.session.message
         self.update()
 
+    def typed(self, step: Callable[[], None]) -> Callable[[Any], None]:
+        """Return what a text field calls: the step is taken when no more is typed."""
+        waiting: list[Timer] = []
+
+        def call(event: Any) -> None:
+            if getattr(event, "client", self.client) is None:
+                return
+            while waiting:  # ends: each turn takes one away
+                waiting.pop().cancel()
+            waiting.append(Timer(TYPING_PAUSE, self.do, (step,)))
+            waiting[0].daemon = True
+            waiting[0].start()
+
+        return call
+
     def do_quietly(self, step: Callable[[], None]) -> None:
         """Take a step of which there are many a second; what is refused is said on the page."""
         try:
@@ -133,7 +152,17 @@ class StudioView:
 
     def _step(self, name: str) -> None:
         session = self.session
-        dict(zip(STEP_NAMES, (session.generate, session.stop, session.undo, session.redo), strict=True))[name]()
+        dict(zip(STEP_NAMES, (session.stop, session.undo, session.redo), strict=True))[name]()
+
+    def _add_keys(self, gui: Any) -> None:
+        """Let keys take steps too."""
+        session = self.session
+        for words, key, step in (
+            ("Undo", "Z", session.undo),
+            ("Redo", "Y", session.redo),
+            ("Generate", "enter", session.generate),
+        ):
+            gui.add_command(words, hotkey=key, modifier="cmd/ctrl").on_trigger(self.step(step))
 
     # ---- clicks
 
