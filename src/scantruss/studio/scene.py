@@ -34,6 +34,7 @@ BEADS, BEAD_SIZE = (
 TUBE_SIDES = 8
 BODY_GAMMA, PANEL_GAMMA = 2.2, 1.45  #: exponents of colours, see `lit`
 SKY_LIGHT = 0.3  #: share of the light that comes from the sky
+PLAIN_LIGHT = 2.0  #: on all sides of bodies, without a sky
 SKY_COLORS = {
     False: ((150, 188, 222), (243, 246, 248)),
     True: ((16, 24, 38), (52, 60, 72)),
@@ -57,33 +58,33 @@ class Scene:
         self.light(False)
         self._scan_key: tuple[Any, ...] = ()
         self._draws_front = False
-        self._scan_scale: tuple[str, float, float] | None = None
+        self._scan_legend = ""
 
-    def scan(self, state: StudioState, wanted: str, section: SectionPlane | None) -> tuple[str, float, float] | None:
-        """Draw the scan of a state, thinned, and return words and ends of the scale of its colours, where there is one.
+    def scan(self, state: StudioState, wanted: str, section: SectionPlane | None) -> str:
+        """Draw the scan of a state, thinned, and return the legend of its colours, where there is one.
 
         Parameters
         ----------
         wanted : str
-            Of `SCAN_COLOURINGS`.
+            Of `colorings_of_scan`.
         """
         assert state.cloud is not None
         key = (state.cloud, wanted, state.grid if wanted == FROM_GRID else None, section)
         if key == self._scan_key:
-            return self._scan_scale
+            return self._scan_legend
         taken = np.arange(0, len(state.cloud.points), max(1, -(-len(state.cloud.points) // DRAWN_POINTS)))
-        colors, scale = colors_of_scan(state.cloud, taken, state.grid, state.settings, wanted)
+        colors, legend = colors_of_scan(state, taken, wanted)
         places = SceneFrame.of(state.cloud).to_scene(state.cloud.points[taken] + state.cloud.origin)
         if section is not None:
             kept = section.keeps(places)
             places, colors = places[kept], colors[kept]
         self.points("/scan", places, np.ascontiguousarray(colors), 0.02)
-        self._scan_key, self._scan_scale = key, scale
-        return scale
+        self._scan_key, self._scan_legend = key, legend
+        return legend
 
     def remove_scan(self) -> None:
         """Draw no scan."""
-        self._scan_key, self._scan_scale = (), None
+        self._scan_key, self._scan_legend = (), ""
         self.remove("/scan")
 
     def remove(self, *names: str) -> None:
@@ -101,6 +102,7 @@ class Scene:
         """
         self.api.configure_environment_map("park" if is_fine else None, environment_intensity=SKY_LIGHT)
         self.api.configure_default_lights(True, cast_shadow=is_fine)
+        self.api.add_light_ambient("/daylight", intensity=0.0 if is_fine else PLAIN_LIGHT)
         self.api.set_background_image(sky(is_dark) if is_fine else None)
         if is_fine:
             self.api.add_grid(

@@ -171,6 +171,10 @@ class StudioView:
         """What a click can do."""
         return tuple(self.modes)
 
+    def when_mode_changes(self, tell: Callable[[], None]) -> None:
+        """Call `tell` whenever a click means something else."""
+        self.click.on_update(lambda _: self.do_quietly(tell))
+
     @property
     def near(self) -> float:
         """Largest angle between a click and what it hits, as seen by the present camera [rad]."""
