@@ -50,10 +50,21 @@ def values_of(column: PageColumn) -> np.ndarray:
     return np.array([np.nan if value is None else value for value in column.values], float)
 
 
-def colors_of(values: np.ndarray, middle: float | None) -> tuple[np.ndarray, float, float]:
-    """Return (N, 3) uint8 colours of values (N,), and what the ends of the scale stand for; plain where a value is NaN."""
+def colors_of(
+    values: np.ndarray, middle: float | None, ends: tuple[float, float] | None = None
+) -> tuple[np.ndarray, float, float]:
+    """Return (N, 3) uint8 colours of values (N,), and what the ends of the scale stand for; plain where a value is NaN.
+
+    Parameters
+    ----------
+    middle : float, optional
+        Of a scale to both sides.
+    ends : (float, float), optional
+        Of the scale; by default the least and the greatest value.
+    """
     known = values[np.isfinite(values)]
     low, high = (float(known.min()), float(known.max())) if len(known) else (0.0, 1.0)
+    low, high = ends or (low, high)
     if middle is not None:
         far = max(high - middle, middle - low) or 1e-9
         low, high = middle - far, middle + far

@@ -88,7 +88,7 @@ class LengthBrush:
         view.modes[PAINT_MODE] = self._click
         self._stroke: Settings | None = None  # while it is dragged
         self._surface: Any = None  # an unseen one, for pointers are followed on bodies only
-        view.when_mode_changes(self._show_surface)
+        view.when_mode_changes(self._take_or_leave)
 
     def _number(self, text: Any, usual: float) -> float:
         try:
@@ -119,6 +119,10 @@ class LengthBrush:
         self.view.session.set("paint", length=made.length, length_field=made.length_field, rows_along=())
 
     # ---- dragging
+
+    def _take_or_leave(self) -> None:
+        self._show_surface()
+        self._draw(self.view.session.settings)
 
     def _show_surface(self) -> None:
         """Follow pointers over the grid while the brush is in hand, and no longer then."""
@@ -165,7 +169,8 @@ class LengthBrush:
     def _draw(self, settings: Settings) -> None:
         """Draw the painted lengths of some settings."""
         field, cloud = settings.length_field, self.view.session.cloud
-        if cloud is None or not field or isinstance(field, str):
+        is_held = self.view.click.value == PAINT_MODE  # else it hides the grid
+        if cloud is None or not field or isinstance(field, str) or not is_held:
             self.view.scene.remove("/painted")
             self.view.legends.show("painted", "")
             return

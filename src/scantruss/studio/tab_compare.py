@@ -89,11 +89,13 @@ class CompareTab:
         aside = 0.0 if self.is_over else BESIDE_FIRST * DRAWN_EXTENT
         nodes = frame.to_scene(chosen.grid.scan_nodes) + np.array([aside, 0.0, 0.0], np.float32)
         values = chosen.grid.lengths
-        words = "member length"
+        words, ends = "member length", None
+        if state.grid is not None:  # the scale of the present one, so that equal colours are equal lengths
+            ends = (float(state.grid.lengths.min()), float(state.grid.lengths.max()))
         if self.distance.value and state.grid is not None:
             values = deviation(chosen.grid, state.grid)[chosen.grid.edges].mean(axis=1)
-            words = "distance from the present design"
-        colors, low, high = colors_of(values, None)
+            words, ends = "distance from the present design", None
+        colors, low, high = colors_of(values, None, ends)
         legend = legend_of(f"{chosen.name}: {words}", chosen.grid.unit, low, high, False)
         self.view.legends.show("beside", legend)
         scene.lines("/beside/members", nodes[chosen.grid.edges], colors)
