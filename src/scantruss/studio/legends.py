@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 LEGEND_WIDTH = 260  #: [pixel]
-LEGEND_GAP = 12  #: from the corner of the drawing [pixel]
+LEGEND_GAP = 12  #: from the lower left corner of the drawing [pixel]
 
 
 class Legends:
@@ -15,7 +15,7 @@ class Legends:
         self._panel = gui.add_panel(visible=False)
         with self._panel.add_tab("Legend"):
             self._html = gui.add_html("")
-        self._panel.float(x=LEGEND_GAP, y=LEGEND_GAP, width=LEGEND_WIDTH)
+        self._panel.float(x=LEGEND_GAP, y=-LEGEND_GAP, width=LEGEND_WIDTH)
         self._shown: dict[str, str] = {}
 
     def show(self, name: str, html: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
 from collections.abc import Callable
 from threading import RLock, Timer
@@ -14,12 +15,12 @@ from ..export.formats import GRID, STRUCTURE
 from ..export.model import Model
 from ..export.page_tables import Tables, tables_of
 from ..structure.build import scale_of
-from .colours import SCAN_COLOURINGS
+from .colours import colorings_of_scan
 from .frame import BESIDE_FIRST, DRAWN_EXTENT, SceneFrame
 from .legends import Legends
 from .outputs import model_to_show
 from .picking import NEAR_ENOUGH, pick
-from .scene import Scene
+from .scene import FIRST_POINTS, Scene
 from .session import Session
 from .state import StudioState
 from .style import PANEL_STYLE
@@ -40,6 +41,10 @@ PLAN_VIEW = 0.08  #: the same of a plan, seen from so far that heights hardly ma
 PLAN_FAR = 1.3  #: of the camera above a plan, so that all of it is seen [distance at which it fills the view]
 PANEL_WIDTH = 452  #: [pixel]
 STEP_NAMES = ("Stop", "Undo", "Redo")
+SMALL_PICTURE, PICTURE_WAIT = (
+    (8, 8),
+    2.0,
+)  #: size of a picture that is asked for first [pixel], and how long it may take [s]
 TYPING_PAUSE = 0.6  #: after which what was typed counts [s]
 
 
@@ -52,10 +57,11 @@ class StudioView:
         self._lock = RLock()
         self._shown: StudioState | None = None
         self._model: tuple[StudioState, Model, Tables] | None = None
-        if session.cloud is not None and session.grid is None:  # seen while the controls are still being made
-            self.scene.scan(session.state, SCAN_COLOURINGS[0], None)
+        if session.cloud is not None:  # seen while the controls are still being made
+            self.scene.scan(session.state, colorings_of_scan(session.state)[0], None, FIRST_POINTS)
             self.overview()
             client.flush()
+            self._wait_for_picture()
         self.modes: dict[str, Click] = {SELECT: self._select_under}  #: what a click in the scene can do
         gui = client.gui
         with client.atomic():
@@ -95,6 +101,11 @@ class StudioView:
         client.scene.on_click()(self._clicked)
         self._end = session.listen(self.update)
         self.update()
+
+    def _wait_for_picture(self) -> None:
+        """Let the page draw what it has, before it is kept busy with a hundred controls."""
+        with contextlib.suppress(RuntimeError, TimeoutError):
+            self.client.get_render(*SMALL_PICTURE, timeout=PICTURE_WAIT)
 
     def close(self) -> None:
         """Stop listening to the session."""
