@@ -118,6 +118,7 @@ class GridTab:
         scene, shown = self.view.scene, self.view.shown_model()
         if shown is None:
             scene.remove(*GRID_PARTS)
+            self.view.legends.show("grid", "")
             return
         model, _ = shown
         places = self.view.places(model)
