@@ -10,3 +10,9 @@ addEventListener("drop", (event) => {
   input.files = one.files;
   input.dispatchEvent(new Event("change", { bubbles: true }));
 });
+
+// Keys that move a slider, the caret or a list turn the camera too, which listens further out: not while a control has them.
+addEventListener("DOMContentLoaded", () => document.body.addEventListener("keydown", (event) => {
+  const plain = !event.ctrlKey && !event.metaKey && /^(Arrow.*|[a-zA-Z])$/.test(event.key);
+  if (plain && event.target.closest("input, textarea, [role=slider], [role=tab], [role=option]")) event.stopPropagation();
+}));

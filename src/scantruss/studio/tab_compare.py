@@ -89,18 +89,26 @@ class CompareTab:
         aside = 0.0 if self.is_over else BESIDE_FIRST * DRAWN_EXTENT
         nodes = frame.to_scene(chosen.grid.scan_nodes) + np.array([aside, 0.0, 0.0], np.float32)
         values = chosen.grid.lengths
-        words, ends = "member length", None
-        if state.grid is not None:  # the scale of the present one, so that equal colours are equal lengths
-            ends = (float(state.grid.lengths.min()), float(state.grid.lengths.max()))
+        words = "member length"
         if self.distance.value and state.grid is not None:
             values = deviation(chosen.grid, state.grid)[chosen.grid.edges].mean(axis=1)
-            words, ends = "distance from the present design", None
-        colors, low, high = colors_of(values, None, ends)
+            words = "distance from the present design"
+        colors, low, high = colors_of(values, None, self.ends)
         legend = legend_of(f"{chosen.name}: {words}", chosen.grid.unit, low, high, False)
         self.view.legends.show("beside", legend)
         scene.lines("/beside/members", nodes[chosen.grid.edges], colors)
         scene.panels("/beside/panels", nodes, chosen.grid.triangles, None, 0.25)
         scene.api.add_label("/beside/name", chosen.name, position=tuple((nodes.max(axis=0)).tolist()))
+
+    @property
+    def ends(self) -> tuple[float, float] | None:
+        """Ends of one scale of member lengths, of the present design and the one beside it; None where none is."""
+        state = self.view.session.state
+        chosen = self._chosen(state)
+        if chosen is None or state.grid is None or self.distance.value:
+            return None
+        both = np.concatenate([chosen.grid.lengths, state.grid.lengths])
+        return float(both.min()), float(both.max())
 
     def _chosen(self, state: StudioState) -> Design | None:
         return next((each for each in state.designs if each.name == self.other.value), None)

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from .state import StudioState
     from .view import StudioView
 
-PLAIN_GRID = "plain"
+PLAIN_GRID, LENGTH = "plain", "member length"
 WHOLE = "none"
 
 
@@ -122,10 +122,14 @@ class GridTab:
             return
         model, _ = shown
         places = self.view.places(model)
+        legend = ""
         colors: dict[str, np.ndarray | None] = {"members": None, "nodes": None, "panels": None}
         if self._values is not None:
             choice = self._choices[self.coloring.value]
-            own, low, high = colors_of(self._values, choice.get("middle"))
+            middle, unit = choice.get("middle"), getattr(self._column(), "unit", "")
+            _, low, high = colors_of(self._values, middle)
+            own, *ends = colors_of(self._values, middle, self.view.compare.ends if choice["words"] == LENGTH else None)
+            legend = legend_of(self.coloring.value, unit, ends[0], ends[1], middle is not None)
             begin, end = self.range.value
             is_whole = begin <= low and end >= high
             selected = None if is_whole else (self._values >= begin) & (self._values <= end)
@@ -135,7 +139,7 @@ class GridTab:
         section, size = self.section, float(np.linalg.norm(np.diff(places[model.members], axis=1), axis=2).mean())
         of_members = plain_colors(len(model.members)) if colors["members"] is None else colors["members"]
         is_faint = self.view.structure.is_moved or self.view.compare.is_over
-        self.view.legends.show("grid", "" if is_faint else self.legend.content)
+        self.view.legends.show("grid", "" if is_faint else legend)
         if self.view.structure.is_moved:
             of_members = np.broadcast_to(DIMMED, of_members.shape)
             self.count.content = "grey as built, while the Structure tab shows a displaced shape"
