@@ -11,7 +11,7 @@ from scan_files import axes, e57, pcd
 import scantruss as st
 from scantruss.scan.formats.own_colors import own_colors
 from scantruss.scan.formats.reading import read_points
-from scantruss.studio.colours import CLASSES, OWN_COLORS, colorings_of_scan, colors_of_scan
+from scantruss.studio.colours import CLASSES, OWN_COLORS, colorings_of_scan, colors_of, colors_of_scan, rgb_of
 from scantruss.studio.outputs import TAKEN, command_of, settings_files
 from scantruss.studio.pictures import facing, over
 from scantruss.studio.project import save_project
@@ -232,3 +232,10 @@ def test_the_ends_of_a_slider_are_round(low: float, high: float) -> None:
     begin, end, step = round_ends(low, high)
     assert begin <= low and high <= end <= high + 1.01 * step and len(f"{end:g}") <= 7
     assert low == high or 90 < (high - low) / step < 1010
+
+
+def test_a_scale_with_given_ends_and_colours_beyond_it() -> None:
+    values = np.array([0.2, 0.7, 1.0, 4.0])
+    colors, low, high = colors_of(values, None, (0.2, 1.0))
+    assert (low, high) == (0.2, 1.0) and np.array_equal(colors[2], colors[3])
+    assert rgb_of("#d81e2c") == (216, 30, 44)

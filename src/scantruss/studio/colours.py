@@ -85,6 +85,20 @@ def legend_of(words: str, unit: str, low: float, high: float, diverging: bool) -
     )
 
 
+def rgb_of(color: str) -> tuple[int, int, int]:
+    """Return the parts of a colour such as #d81e2c, from 0 to 255."""
+    red, green, blue = bytes.fromhex(color.removeprefix("#"))
+    return red, green, blue
+
+
+def legend_of_more(most: float, color: str) -> str:
+    """Return the legend of values beyond the scale as HTML."""
+    return (
+        '<div style="display:flex;gap:.5em;align-items:center;padding:0 .6em;font-size:.85em">'
+        f'<span style="width:.9em;height:.9em;background:{color}"></span>more than {most:g}</div>'
+    )
+
+
 def histogram_of(values: np.ndarray, low: float, high: float, diverging: bool) -> str:
     """Return a histogram of values between the ends of the scale as HTML, its bars in the colours of the scale."""
     counts, _ = np.histogram(values[np.isfinite(values)], BARS, (low, high if high > low else low + 1.0))

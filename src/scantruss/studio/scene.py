@@ -26,10 +26,10 @@ LINE_WIDTH, WIDE, FAINT = 3.0, 7.0, 1.0  #: of members, of what stands out, of w
 TUBE_RADIUS, BALL_RADIUS = 0.05, 0.09  #: of members and nodes drawn as bodies [mean member length]
 DRAWN_POINTS, FIRST_POINTS = 100_000, 20_000  #: of the scan; of its first picture
 MOST_DRAWN_LINES = 4000  #: members that are drawn as lines
-MOST_BEADS = 44_000  #: points by which so many members are drawn
+MOST_BEADS = 33_000  #: points by which so many members are drawn
 BEADS, BEAD_SIZE = (
-    (4, 12),
-    0.9,
+    (3, 12),
+    0.6,
 )  #: points of such a member at least and at most, and how large they are [their distance]
 TUBE_SIDES = 8
 BODY_GAMMA, PANEL_GAMMA = 2.2, 1.45  #: exponents of colours, see `lit`

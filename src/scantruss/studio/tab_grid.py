@@ -8,7 +8,7 @@ import numpy as np
 
 from ..export.page_tables import PageColumn, colorings_of
 from .certificate_list import CertificateList
-from .colours import DIMMED, colors_of, histogram_of, legend_of, values_of
+from .colours import DIMMED, colors_of, histogram_of, legend_of, legend_of_more, rgb_of, values_of
 from .frame import SectionPlane
 from .pictures import PictureTool
 from .scene import (
@@ -128,8 +128,15 @@ class GridTab:
             choice = self._choices[self.coloring.value]
             middle, unit = choice.get("middle"), getattr(self._column(), "unit", "")
             _, low, high = colors_of(self._values, middle)
-            own, *ends = colors_of(self._values, middle, self.view.compare.ends if choice["words"] == LENGTH else None)
-            legend = legend_of(self.coloring.value, unit, ends[0], ends[1], middle is not None)
+            ends = self.view.compare.ends if choice["words"] == LENGTH else None
+            most, too_much = choice.get("most", (np.inf, ""))
+            if high > most:
+                ends = (min(low, most), most)
+            own, *shown_ends = colors_of(self._values, middle, ends)
+            own[self._values > most] = rgb_of(too_much) if high > most else 0
+            legend = legend_of(self.coloring.value, unit, shown_ends[0], shown_ends[1], middle is not None)
+            legend += legend_of_more(most, too_much) if high > most else ""
+            self.legend.content = legend
             begin, end = self.range.value
             is_whole = begin <= low and end >= high
             selected = None if is_whole else (self._values >= begin) & (self._values <= end)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 SHOWN_DISPLACEMENT = 0.06  #: of the greatest displacement, as it is drawn first [extent of the scan]
 LOAD_ARROW = 0.08  #: of the greatest load [extent of the scan]
 SUPPORT_COLOR = np.array((20, 130, 60), np.uint8)
-LOAD_COLOR = np.array((214, 60, 40), np.uint8)
+LOAD_COLOR = np.array((235, 120, 10), np.uint8)
 MOST_ARROWS = 160  #: of loads, spread over the structure
 ARROW_WIDTH = 2.0  #: of a load [pixel]
 SUPPORT_RADIUS = 0.09  #: of a support that is drawn [scene]

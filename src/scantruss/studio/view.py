@@ -39,7 +39,8 @@ SELECT = "select"
 NATURAL_VIEW = 0.65  #: of the camera, upright [rad]
 PLAN_VIEW = 0.08  #: the same of a plan, seen from so far that heights hardly matter [rad]
 PLAN_FAR = 1.3  #: of the camera above a plan, so that all of it is seen [distance at which it fills the view]
-PANEL_WIDTH = 452  #: [pixel]
+PANEL_WIDTH, USUAL_WIDTH = 452, 1280  #: of the panel; of a page that has not said its own [pixel]
+WIDE_ENOUGH = 1.15  #: width over height of a drawing whose width does not limit what is seen
 STEP_NAMES = ("Stop", "Undo", "Redo")
 SMALL_PICTURE, PICTURE_WAIT = (
     (8, 8),
@@ -54,6 +55,8 @@ class StudioView:
     def __init__(self, session: Session, client: Any) -> None:
         self.session, self.client = session, client
         self.scene = Scene(client.scene)
+        whole = float(client.camera.image_width or USUAL_WIDTH)
+        self._width = max(whole - PANEL_WIDTH, 0.5 * whole)  # of the drawing once the panel is beside it [pixel]
         self._lock = RLock()
         self._shown: StudioState | None = None
         self._model: tuple[StudioState, Model, Tables] | None = None
@@ -276,11 +279,18 @@ class StudioView:
             self.client.camera.position = (0.0, -1e-3 * high, high)
             self.client.camera.look_at = (0.0, 0.0, 0.0)
 
+    @property
+    def _aspect(self) -> float:
+        """Width over height of the drawing, the panel beside it."""
+        camera = self.client.camera
+        return max(min(float(camera.image_width), self._width) / max(float(camera.image_height), 1.0), 0.3)
+
     def overview(self, designs: int = 1) -> None:
         """Move the camera so that all of the scan is seen, or of several designs side by side."""
         middle = np.array([0.5 * BESIDE_FIRST * DRAWN_EXTENT * (designs - 1), 0.0, 0.0])
+        far = DRAWN_EXTENT * (0.3 + 0.7 * designs) * max(1.0, WIDE_ENOUGH / self._aspect)
         self.client.camera.fov = NATURAL_VIEW
-        self.client.camera.position = tuple(middle + DRAWN_EXTENT * (0.3 + 0.7 * designs) * np.array([0.8, -1.4, 0.9]))
+        self.client.camera.position = tuple(middle + far * np.array([0.8, -1.4, 0.9]))
         self.client.camera.look_at = tuple(middle)
 
     def update(self) -> None:
