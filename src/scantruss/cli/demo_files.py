@@ -60,7 +60,7 @@ def save_demo(demo: Demo, folder: Path, grid: Grid, cloud: PointCloud, *, force:
         What was written.
     """
     from ..export.formats import write
-    from ..export.solid_apart import print_apart
+    from ..export.printed.apart import print_apart
     from ..export.style import FileStyle
     from ..report.figures import report_of
     from ..runtime.files import SaveTogether

@@ -63,7 +63,7 @@ def bed(text: str) -> Bed:
 
 def print_solid(values: Namespace) -> None:
     """Make the printable model of a saved grid."""
-    from ..export.solid_apart import print_apart
+    from ..export.printed.apart import print_apart
     from ..report.terminal import Bars, print_lines
     from ..runtime.files import SaveTogether, check_place
     from ..structure.layered import grid_in_metres
@@ -102,7 +102,7 @@ def print_solid(values: Namespace) -> None:
 
 def _print_parts(grid: Grid, outs: list[Path], values: Namespace) -> None:
     """Make the printable model in parts."""
-    from ..export.solid_apart import print_parts_apart
+    from ..export.printed.apart import print_parts_apart
     from ..report.terminal import Bars, print_lines
     from ..runtime.files import SaveTogether
 

@@ -76,7 +76,7 @@ def _structure_report(state: StudioState, suffix: str) -> dict[str, bytes]:
 
 
 def _printed(state: StudioState, size: float) -> dict[str, bytes]:
-    from ..export.solid_apart import print_apart
+    from ..export.printed.apart import print_apart
 
     model_to_show(state, GRID)
     grid = state.grid
@@ -85,7 +85,9 @@ def _printed(state: StudioState, size: float) -> dict[str, bytes]:
         raise InputError("a model to print needs the unit of the scan; choose it in the Scan tab and generate again")
     if not size > 0:
         raise InputError(f"the longest side of a model needs to be positive, got {size:g} mm")
-    millimetre = UNITS["mm"] / UNITS[grid.unit]
+    metres = UNITS[grid.unit]
+    assert metres is not None
+    millimetre = 1e-3 / metres
     scale = size * millimetre / float((grid.nodes.max(axis=0) - grid.nodes.min(axis=0)).max())
     with temporary_folder() as folder:
         print_apart(

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from .state import StudioState
     from .view import StudioView
 
-PLAIN_GRID, LENGTH = "plain", "member length"
+PLAIN_GRID, BY_LENGTH = "plain", "member length"
 WHOLE = "none"
 
 
@@ -128,11 +128,11 @@ class GridTab:
             choice = self._choices[self.coloring.value]
             middle, unit = choice.get("middle"), getattr(self._column(), "unit", "")
             _, low, high = colors_of(self._values, middle)
-            ends = self.view.compare.ends if choice["words"] == LENGTH else None
+            scale_ends = self.view.compare.ends if choice["words"] == BY_LENGTH else None
             most, too_much = choice.get("most", (np.inf, ""))
             if high > most:
-                ends = (min(low, most), most)
-            own, *shown_ends = colors_of(self._values, middle, ends)
+                scale_ends = (min(low, most), most)
+            own, *shown_ends = colors_of(self._values, middle, scale_ends)
             own[self._values > most] = rgb_of(too_much) if high > most else 0
             legend = legend_of(self.coloring.value, unit, shown_ends[0], shown_ends[1], middle is not None)
             legend += legend_of_more(most, too_much) if high > most else ""

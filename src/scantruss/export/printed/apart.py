@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 if TYPE_CHECKING:
-    from ..grid.grid import Grid
-    from ..runtime.cluster import Work
-    from .printed.write import PrintedParts
-    from .solid_files import Solid
+    from ...grid.grid import Grid
+    from ...runtime.cluster import Work
+    from ..solid_files import Solid
+    from .write import PrintedParts
 
 Made = TypeVar("Made")
 
@@ -30,21 +30,21 @@ def print_parts_apart(grid: Grid, path: Path, **options: Any) -> PrintedParts:
 
 
 def _made_apart(work: Work[tuple[Grid, Path], Made], grid: Grid, path: Path, options: dict[str, Any]) -> Made:
-    from ..runtime.cluster import Processes, Workers
+    from ...runtime.cluster import Processes, Workers
 
     with Processes(1) if len(grid.nodes) + len(grid.edges) > MOST_HERE else Workers() as worker:
         return next(worker.run(work, [(grid, path)], options))[1]
 
 
 def _print(job: tuple[Grid, Path], options: dict[str, Any]) -> Solid:
-    from .solid import print_model
+    from ..solid import print_model
 
     grid, path = job
     return print_model(grid, path, **options)
 
 
 def _print_parts_of(job: tuple[Grid, Path], options: dict[str, Any]) -> PrintedParts:
-    from .printed.write import print_parts
+    from .write import print_parts
 
     grid, path = job
     return print_parts(grid, path, **options)
