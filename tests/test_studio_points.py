@@ -11,6 +11,7 @@ from scan_files import axes, e57, pcd
 import scantruss as st
 from scantruss.scan.formats.own_colors import own_colors
 from scantruss.scan.formats.reading import read_points
+from scantruss.studio.browsers import Browsers
 from scantruss.studio.colours import CLASSES, OWN_COLORS, colorings_of_scan, colors_of, colors_of_scan, rgb_of
 from scantruss.studio.outputs import TAKEN, command_of, settings_files
 from scantruss.studio.pictures import facing, over
@@ -165,6 +166,17 @@ def test_each_scan_that_is_opened_has_a_project_of_its_own(tmp_path: Path) -> No
     assert session.place == tmp_path / "a.scantruss" and session.settings.unit == "m"
     session.open_path("a.scantruss")
     assert session.worker.wait(120) and session.place == tmp_path / "a.scantruss" and session.settings.unit == "m"
+
+
+def test_a_project_that_another_browser_has_open_is_opened_as_a_copy(tmp_path: Path) -> None:
+    np.savetxt(tmp_path / "a.xyz", P)
+    browsers = Browsers(opened(tmp_path / "a.xyz", tmp_path / "a.scantruss"))
+    (_, first), (_, second) = browsers.join(None), browsers.join(None)
+    first.set_unit("m")
+    second.open_path("a.scantruss")
+    assert second.worker.wait(120) and second.settings.unit == "m"
+    assert first.place == tmp_path / "a.scantruss" and second.place not in (None, first.place)
+    browsers.stop()
 
 
 @pytest.mark.parametrize("name", ["../out.xyz", "/etc/passwd", "none.xyz", "inner/../../out.xyz", ""])

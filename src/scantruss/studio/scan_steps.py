@@ -110,7 +110,8 @@ class ScanSteps(Steps):
             if path.suffix.lower() == ".scantruss":
                 state, solved = read_project(path)
                 taken = solved_state(state) if solved else state
-                self._open_state(f"open {path.name}", taken, max(self._places) + 1, path)
+                place = next_free(path, self.is_taken) if self.is_taken(path) else path
+                self._open_state(f"open {path.name}", taken, max(self._places) + 1, place)
                 return
             cloud = read_whole(path)
             self._start(WholeScan(cloud, *marks_of(path, cloud)))

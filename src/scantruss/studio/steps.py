@@ -33,6 +33,7 @@ class Steps:
         self.folder = folder
         self.state = StudioState()
         self._places: dict[int, Path | None] = {self.state.opened: project}
+        self.is_taken: Callable[[Path], bool] = lambda place: False  #: whether another browser saves a project there
         self.history = History()
         self.message = ""  #: why the last step was refused, in the words of the command line
         self.stage, self.share = "", 0.0
