@@ -4,9 +4,10 @@ import io
 import socket
 import subprocess
 import sys
+import time
 import urllib.error
 import urllib.request
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +22,7 @@ import scantruss as st
 from scantruss.cli.main import main
 from scantruss.studio.browsers import Browsers
 from scantruss.studio.colours import colors_of
-from scantruss.studio.server import Guard, serve_browsers, start_server
+from scantruss.studio.server import DROP_SCRIPT, Guard, serve_browsers, start_server
 from scantruss.studio.session import Session
 
 
@@ -67,6 +68,10 @@ def test_only_our_own_page_is_served(served: tuple[str, Session]) -> None:
     assert status(address, Origin="http://example.org") == 403
     assert status(address, Host="example.org") == 403
     assert status(address + "../../../../etc/passwd") == 404
+    with urllib.request.urlopen(address, timeout=10) as answer:
+        assert answer.headers["X-Frame-Options"] == "DENY"  # no other page shows it within itself
+        page = answer.read()
+        assert int(answer.headers["Content-Length"]) == len(page) and DROP_SCRIPT.read_bytes() in page
 
 
 @pytest.mark.parametrize(
@@ -156,6 +161,23 @@ def shown_colors(page: Any) -> np.ndarray:
     return np.asarray(picture.convert("RGB")).reshape(-1, 3).astype(int)
 
 
+def drag(page: Any, begin: tuple[float, float], end: tuple[float, float]) -> None:
+    """Drag from one place of the drawing to another."""
+    page.mouse.move(*begin)
+    page.mouse.down()
+    page.mouse.move(*end, steps=8)
+    page.wait_for_timeout(400)
+    page.mouse.up()
+
+
+def until(holds: Callable[[], bool], seconds: float = 30.0) -> bool:
+    """Wait until something holds; whether it does."""
+    end = time.monotonic() + seconds
+    while not holds() and time.monotonic() < end:  # ends: time passes
+        time.sleep(0.05)
+    return holds()
+
+
 def tab(page: Any, name: str) -> None:
     """Go to a step."""
     page.click(f"[role=tab]:has-text('{name}')")
@@ -219,9 +241,25 @@ def test_a_person_makes_a_grid_and_a_structure(served: tuple[str, Session], tmp_
         (place,) = session.settings.fixed
         assert abs(place[2] - (2 - 0.04 * ((place[0] - 5) ** 2 + (place[1] - 5) ** 2))) < 1e-6  # it lies on the scan
         assert session.grid is not None and session.grid.fixed.sum() == 1
-        page.click("button:has-text('Undo')")
+        drag(page, (410, 350), (460, 330))
+        assert until(lambda: session.settings.fixed != (place,)) and session.worker.wait(60)
+        (moved,) = session.settings.fixed
+        assert abs(moved[2] - (2 - 0.04 * ((moved[0] - 5) ** 2 + (moved[1] - 5) ** 2))) < 1e-6
+        for _ in range(2):
+            page.locator("body").press("Control+z")
         page.wait_for_selector("text=redo: fixed node")
-        assert session.settings.fixed == ()
+        assert until(lambda: session.settings.fixed == ())
+        tab(page, "Design")
+        page.click("text=Length brush")
+        page.click("button:has-text('Paint')")
+        page.wait_for_selector("input[value='paint length']")
+        page.wait_for_timeout(500)
+        drag(page, (400, 380), (470, 360))
+        page.wait_for_selector("text=undo: paint")
+        assert len({row[3] for row in session.settings.length_field}) == 2
+        page.click("button:has-text('Undo')")
+        page.wait_for_selector("text=redo: paint")
+        tab(page, "Constraints")
         page.click("button:has-text('Draw by clicks')")
         page.wait_for_selector("input[value='draw line']")
         for x in (360, 460):

@@ -1,18 +1,44 @@
 """The structure of the studio is that of the command line: sections, modes, masses."""
 
+import io
 import json
 from pathlib import Path
 
 import numpy as np
+import openpyxl
 import pytest
+import trimesh
 
 import scantruss as st
 from scantruss.cli.main import main
+from scantruss.studio.further_files import FURTHER_FILES, PRINTED, PRINTED_BALL, SCHEDULES, further_files
 from scantruss.studio.outputs import settings_files
 from scantruss.studio.session import Session
 from scantruss.studio.tab_structure import scale_of_text, weight_bars
 
 PATIENCE = 120.0
+
+
+def check_further_files(session: Session, folder: Path) -> None:
+    """Schedules, reports and the model to print, read by other programs."""
+    grid = session.grid
+    assert grid is not None
+    found: dict[str, bytes] = {}
+    for what in (each for each in FURTHER_FILES if not each.endswith(".pdf")):
+        found |= further_files(session.state, what, 120.0)
+    for name in ("grid-report.html", "structure-report.html"):
+        assert b"<html" in found[name] and b"http-equiv" not in found[name] and len(found[name]) < 5_000_000
+    members = openpyxl.load_workbook(io.BytesIO(found["schedules.xlsx"]))["Members"]
+    assert members.max_row > len(grid.edges)
+    (folder / "model.3mf").write_bytes(found["model.3mf"])
+    solid = trimesh.load(folder / "model.3mf", force="mesh")
+    millimetres = {"m": 1e3, "meter": 1e3, "meters": 1e3, "mm": 1.0, "millimeter": 1.0, "millimeters": 1.0, None: 1e3}
+    longest = float(solid.extents.max()) * millimetres[solid.units]
+    assert solid.is_watertight and abs(longest - 120.0) <= 2 * PRINTED_BALL
+    with pytest.raises(st.InputError, match="positive"):
+        further_files(session.state, PRINTED, 0.0)
+    with pytest.raises(st.InputError, match="press Generate"):
+        further_files(Session().state, SCHEDULES, 120.0)
 
 
 def test_sizing_and_modes_are_those_of_the_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -38,6 +64,7 @@ def test_sizing_and_modes_are_those_of_the_command_line(tmp_path: Path, monkeypa
     ours, theirs = report.to_dict(), json.loads(Path("r.json").read_text())
     for name in ("sections", "weights", "utilization_max", "buckling", "frequencies"):
         assert json.loads(json.dumps(ours.get(name))) == theirs.get(name), name
+    check_further_files(session, tmp_path)
     again = Session()
     again.open(tmp_path / "dome.scantruss")
     assert again.state.structure_settings == session.state.structure_settings

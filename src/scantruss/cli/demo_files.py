@@ -60,10 +60,10 @@ def save_demo(demo: Demo, folder: Path, grid: Grid, cloud: PointCloud, *, force:
         What was written.
     """
     from ..export.formats import write
+    from ..export.printed.apart import print_apart
     from ..export.style import FileStyle
     from ..report.figures import report_of
     from ..runtime.files import SaveTogether
-    from .print import print_apart
 
     millimetre = 1e-3 / (UNITS[grid.unit] or 1e-3)
     style = FileStyle(views=(demo.view,))

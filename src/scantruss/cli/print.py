@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from argparse import ArgumentTypeError, Namespace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING
 
 from ..errors import InputError, words_of_number
 from .grids import add_grid, read_grid_or_structure
@@ -12,15 +12,8 @@ from .outputs import claim, outs_of
 
 if TYPE_CHECKING:
     from ..export.printed.plates import Bed
-    from ..export.printed.write import PrintedParts
-    from ..export.solid_files import Solid
     from ..grid.grid import Grid
-    from ..runtime.cluster import Work
     from .options import Parser
-
-Made = TypeVar("Made")
-
-MOST_HERE = 500  # members and nodes that are united in this process
 
 
 def print_parser() -> Parser:
@@ -72,6 +65,7 @@ def bed(text: str) -> Bed:
 
 def print_solid(values: Namespace) -> None:
     """Make the printable model of a saved grid."""
+    from ..export.printed.apart import print_apart
     from ..report.terminal import Bars, print_lines
     from ..runtime.files import SaveTogether, check_place
     from ..structure.layered import grid_in_metres
@@ -110,6 +104,7 @@ def print_solid(values: Namespace) -> None:
 
 def _print_parts(grid: Grid, outs: list[Path], values: Namespace) -> None:
     """Make the printable model in parts."""
+    from ..export.printed.apart import print_parts_apart
     from ..report.terminal import Bars, print_lines
     from ..runtime.files import SaveTogether
 
@@ -118,41 +113,12 @@ def _print_parts(grid: Grid, outs: list[Path], values: Namespace) -> None:
     with Bars() as bars, SaveTogether("" if values.force else "result") as save:
         for number, out in enumerate(outs):
             bars("solids", number / len(outs))
-            made = _apart(_print_parts_of, grid, save.beside(out), options)
+            made = print_parts_apart(grid, save.beside(out), **options)
     size = " x ".join(words_of_number(side, 4) for side in made.size)
     what = "balls with sockets" if values.sockets else "parts with plug joints"
     notes = [note for out in outs for note in model_note(out, made.unit)]
     files = f"{len(made.files):,} files, {made.files[0]} to {made.files[-1]}"
     print_lines([*made.notes, *notes, f"wrote {files}: {made.parts:,} {what}, the largest {size} {made.unit}".rstrip()])
-
-
-def print_apart(grid: Grid, path: Path, **options: Any) -> Solid:
-    """Write the solid of a grid (see `print_model`), a large one in a process of its own, which can be ended at any moment.
-
-    The library that unites the parts lets nobody else work meanwhile, and nobody hear of a signal.
-    """
-    return _apart(_print, grid, path, options)
-
-
-def _apart(work: Work[tuple[Grid, Path], Made], grid: Grid, path: Path, options: dict[str, Any]) -> Made:
-    from ..runtime.cluster import Processes, Workers
-
-    with Processes(1) if len(grid.nodes) + len(grid.edges) > MOST_HERE else Workers() as worker:
-        return next(worker.run(work, [(grid, path)], options))[1]
-
-
-def _print(job: tuple[Grid, Path], options: dict[str, Any]) -> Solid:
-    from ..export.solid import print_model
-
-    grid, path = job
-    return print_model(grid, path, **options)
-
-
-def _print_parts_of(job: tuple[Grid, Path], options: dict[str, Any]) -> PrintedParts:
-    from ..export.printed.write import print_parts
-
-    grid, path = job
-    return print_parts(grid, path, **options)
 
 
 def model_note(out: Path, unit: str) -> list[str]:

@@ -233,7 +233,7 @@ def _limits(truss: Truss, figures: Sequence[CaseFigures], checks: MemberChecks) 
     if span > 0 and most.displacement_max > span / checks.deflection:
         ratio = span / most.displacement_max if most.displacement_max else math.inf
         said.append(
-            f"the displacement of {1e3 * most.displacement_max:.3g} mm under {most.name} is span/{ratio:.0f}, more than"
+            f"the displacement of {words_of_number(1e3 * most.displacement_max, 3)} mm under {most.name} is span/{ratio:.0f}, more than"
             f" span/{checks.deflection:g} of the span {span:.3g} m"
         )
     return said

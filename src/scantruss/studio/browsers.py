@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import secrets
+from collections.abc import Callable
 from pathlib import Path
 from threading import RLock
 
@@ -28,6 +29,7 @@ class Browsers:
         self._sessions: dict[str, Session] = {}
         self._open: dict[str, int] = {}  # pages that each browser has open
         self._taken = {first.place}
+        first.is_taken = self._saved_by_others(first)
 
     def join(self, key: str | None) -> tuple[str, Session]:
         """Return the key and the session of a browser that has opened a page.
@@ -69,8 +71,18 @@ class Browsers:
             raise InputError(f"{MOST_BROWSERS} browsers have this studio open, which are the most; close one")
         place = self._first.place
         session = Session(None if place is None else self._free(place), folder=self._first.folder)
+        session.is_taken = self._saved_by_others(session)
         session.begin(self._begun)
         return session
+
+    def _saved_by_others(self, own: Session) -> Callable[[Path], bool]:
+        """Return what tells whether a browser but this one saves a project in a place."""
+
+        def is_taken(place: Path) -> bool:
+            others = {id(each): each for each in (self._first, *self._sessions.values()) if each is not own}
+            return any(each.place is not None and each.place.resolve() == place.resolve() for each in others.values())
+
+        return is_taken
 
     def _free(self, place: Path) -> Path:
         """Return the next name beside a project that nobody has."""

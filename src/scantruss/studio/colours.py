@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from html import escape
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from ..check.distances import distances_to_grid
 from ..export.page_tables import PageColumn
-from ..grid.grid import Grid
-from ..scan.cloud import PointCloud
-from ..settings import Settings
 from ..surface.chosen_samples import KEPT
 from ..surface.samples import sample_surface
+
+if TYPE_CHECKING:
+    from .state import StudioState
 
 RISING = np.array([(68, 1, 84), (59, 82, 139), (33, 145, 140), (94, 201, 98), (230, 226, 106)], float)
 DIVERGING = np.array([(178, 24, 43), (239, 138, 98), (200, 200, 200), (103, 169, 207), (33, 102, 172)], float)
@@ -23,7 +24,18 @@ BARS = 24  #: of a histogram
 AROUND_POINT = 10  #: neighbours of which the normal of a point is made
 OUTLIERS_IN_RED = "outliers in red"
 FROM_GRID = "distance from the grid"
+OWN_COLORS, CLASSES = "own colours", "class"  #: of scans that have them
 SCAN_COLOURINGS = ("height", FROM_GRID, "normals", OUTLIERS_IN_RED, "plain")
+CLASS_NAMES = {
+    0: "never classified", 1: "unclassified", 2: "ground", 3: "low vegetation", 4: "medium vegetation", 5: "high vegetation",
+    6: "building", 7: "low noise", 9: "water", 10: "rail", 11: "road", 13: "wire guard", 14: "wire", 15: "tower", 17: "bridge deck",
+    18: "high noise",
+}  # fmt: skip  # ASPRS, LAS 1.4 R15 table 17
+MOST_CLASSES = 24  #: that are listed
+CLASS_COLORS = np.array([
+    (120, 120, 120), (160, 160, 160), (166, 118, 29), (178, 223, 138), (102, 166, 30), (27, 120, 55), (214, 69, 65), (231, 41, 138),
+    (117, 112, 179), (56, 108, 176), (90, 60, 130), (60, 60, 60), (255, 170, 60), (250, 128, 114), (128, 177, 211), (141, 90, 60),
+], np.uint8)  # fmt: skip
 OUTLIER_COLOR = np.array([200, 20, 20], np.uint8)
 
 
@@ -38,10 +50,21 @@ def values_of(column: PageColumn) -> np.ndarray:
     return np.array([np.nan if value is None else value for value in column.values], float)
 
 
-def colors_of(values: np.ndarray, middle: float | None) -> tuple[np.ndarray, float, float]:
-    """Return (N, 3) uint8 colours of values (N,), and what the ends of the scale stand for; plain where a value is NaN."""
+def colors_of(
+    values: np.ndarray, middle: float | None, ends: tuple[float, float] | None = None
+) -> tuple[np.ndarray, float, float]:
+    """Return (N, 3) uint8 colours of values (N,), and what the ends of the scale stand for; plain where a value is NaN.
+
+    Parameters
+    ----------
+    middle : float, optional
+        Of a scale to both sides.
+    ends : (float, float), optional
+        Of the scale; by default the least and the greatest value.
+    """
     known = values[np.isfinite(values)]
     low, high = (float(known.min()), float(known.max())) if len(known) else (0.0, 1.0)
+    low, high = ends or (low, high)
     if middle is not None:
         far = max(high - middle, middle - low) or 1e-9
         low, high = middle - far, middle + far
@@ -62,6 +85,20 @@ def legend_of(words: str, unit: str, low: float, high: float, diverging: bool) -
     )
 
 
+def rgb_of(color: str) -> tuple[int, int, int]:
+    """Return the parts of a colour such as #d81e2c, from 0 to 255."""
+    red, green, blue = bytes.fromhex(color.removeprefix("#"))
+    return red, green, blue
+
+
+def legend_of_more(most: float, color: str) -> str:
+    """Return the legend of values beyond the scale as HTML."""
+    return (
+        '<div style="display:flex;gap:.5em;align-items:center;padding:0 .6em;font-size:.85em">'
+        f'<span style="width:.9em;height:.9em;background:{color}"></span>more than {most:g}</div>'
+    )
+
+
 def histogram_of(values: np.ndarray, low: float, high: float, diverging: bool) -> str:
     """Return a histogram of values between the ends of the scale as HTML, its bars in the colours of the scale."""
     counts, _ = np.histogram(values[np.isfinite(values)], BARS, (low, high if high > low else low + 1.0))
@@ -74,23 +111,37 @@ def histogram_of(values: np.ndarray, low: float, high: float, diverging: bool) -
     return f'<div style="display:flex;align-items:flex-end;height:3.5em;margin:0 .6em;gap:1px">{bars}</div>'
 
 
-def colors_of_scan(
-    cloud: PointCloud, taken: np.ndarray, grid: Grid | None, settings: Settings, wanted: str
-) -> tuple[np.ndarray, tuple[str, float, float] | None]:
-    """Return (K, 3) uint8 colours of some points of a scan, and words and ends of the scale, where there is one.
+def colorings_of_scan(state: StudioState) -> tuple[str, ...]:
+    """Return the colourings that a scan can have."""
+    whole = state.whole
+    own = (OWN_COLORS,) if whole is not None and whole.colors is not None else ()
+    return (*own, *((CLASSES,) if whole is not None and whole.classes is not None else ()), *SCAN_COLOURINGS)
+
+
+def colors_of_scan(state: StudioState, taken: np.ndarray, wanted: str) -> tuple[np.ndarray, str]:
+    """Return (K, 3) uint8 colours of some points of the scan of a state, and their legend as HTML, where there is one.
 
     Parameters
     ----------
     taken : (K,) int, the points that are drawn
-    wanted : str, of `SCAN_COLOURINGS`
+    wanted : str, of `colorings_of_scan`
     """
+    cloud, grid, whole = state.cloud, state.grid, state.whole
+    assert cloud is not None
     points = cloud.points[taken]
+    if wanted in (OWN_COLORS, CLASSES) and whole is not None:
+        of_whole = np.flatnonzero(state.taken())[taken]
+        if wanted == OWN_COLORS and whole.colors is not None:
+            return whole.colors[of_whole], ""
+        if wanted == CLASSES and whole.classes is not None:
+            numbers = whole.classes[of_whole].astype(np.int64)
+            return CLASS_COLORS[numbers % len(CLASS_COLORS)], legend_of_classes(np.unique(numbers).tolist())
     if wanted == "normals":
         normals = cloud.normals[taken] if cloud.normals is not None else _normals(points)
-        return (127.5 * (normals + 1.0)).astype(np.uint8), None
+        return (127.5 * (normals + 1.0)).astype(np.uint8), ""
     if wanted == OUTLIERS_IN_RED:
-        kept = sample_surface(cloud, settings).judged[taken] == KEPT
-        return np.where(kept[:, None], PLAIN, OUTLIER_COLOR), None
+        kept = sample_surface(cloud, state.settings).judged[taken] == KEPT
+        return np.where(kept[:, None], PLAIN, OUTLIER_COLOR), ""
     if wanted == FROM_GRID and grid is not None:
         places = np.ascontiguousarray(points + cloud.origin - grid.origin)
         values, _ = distances_to_grid(places, grid, float(grid.lengths.mean()))
@@ -98,9 +149,20 @@ def colors_of_scan(
     elif wanted == "height":
         values = points[:, 2] + cloud.origin[2]
     else:
-        return np.broadcast_to(PLAIN, points.shape), None
+        return np.broadcast_to(PLAIN, points.shape), ""
     colors, low, high = colors_of(values, None)
-    return colors, (wanted, low, high)
+    return colors, legend_of(wanted, cloud.unit, low, high, False)
+
+
+def legend_of_classes(numbers: list[int]) -> str:
+    """Return the legend of classes as HTML."""
+    rows = "".join(
+        '<div style="display:flex;gap:.5em;align-items:center"><span style="width:.9em;height:.9em;'
+        f'background:rgb({",".join(map(str, CLASS_COLORS[number % len(CLASS_COLORS)].tolist()))})"></span>'
+        f"{number} {CLASS_NAMES.get(number, '')}</div>"
+        for number in numbers[:MOST_CLASSES]
+    )
+    return f'<div style="padding:0 .6em;font-size:.85em">class{rows}</div>'
 
 
 def _normals(points: np.ndarray) -> np.ndarray:

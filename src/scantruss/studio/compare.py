@@ -7,7 +7,7 @@ from html import escape
 import numpy as np
 
 from ..check.distances import distances_to_grid
-from ..errors import InputError
+from ..errors import InputError, words_of_number
 from ..grid.grid import Grid
 from .state import Design, StudioState
 
@@ -41,7 +41,7 @@ def structure_figures(state: StudioState) -> list[tuple[str, str]]:
     used = values["utilization_max"]
     rows = [
         ("utilization", "-" if used is None else f"{used:.2f}"),
-        ("displacement", f"{1e3 * moves.displacement_max:.3g} mm under {moves.name}"),
+        ("displacement", f"{words_of_number(1e3 * moves.displacement_max, 3)} mm under {moves.name}"),
         ("axial forces", f"{values['force_min'] / 1e3:.4g} to {values['force_max'] / 1e3:.4g} kN"),
         ("mass without nodes", f"{report.truss.mass:,.0f} kg"),
     ]

@@ -78,7 +78,7 @@ class FeatureList:
     def _box(self, number: int, feature: Feature, is_off: bool) -> Any:
         """Return the box of a hole ("close") or a ridge ("follow")."""
         is_hole = feature.kind == HOLES
-        words = f"{'close hole' if is_hole else 'follow ridge'} {number + 1}, {feature.words}"
-        box = self._gui.add_checkbox(words, is_off == is_hole)
+        words = f"{'close hole' if is_hole else 'follow ridge'} {number + 1}"
+        box = self._gui.add_checkbox(words, is_off == is_hole, hint=feature.words)
         box.on_update(self.view.step(lambda: self.view.session.switch(number)))
         return box

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError
+from .dragging import DraggedBalls
 from .drawn_lines import ScannedPoints, numbers_of
 from .frame import SceneFrame
 from .picking import nearest_point
@@ -23,15 +24,15 @@ FIX_WAYS = ("Add", "Move", "Delete")
 
 
 class FixedNodes:
-    """The list of fixed nodes, and the handle with which the chosen one is dragged."""
+    """The list of fixed nodes, and the balls by which they are dragged."""
 
     def __init__(self, view: StudioView, gui: Any) -> None:
         self.view = view
-        by_click = gui.add_button("Place by clicks", hint="then click on the scan")
+        by_click = gui.add_button("Place by clicks", hint="then click on the scan; drag a ball to move it")
         self.chosen = gui.add_dropdown("node", (NONE_CHOSEN,))
         self.words = gui.add_text("x, y, z", "", hint="in the frame of the scan, in its unit")
         ways = gui.add_button_group("typed", FIX_WAYS, hint="Add x, y, z, or move the chosen node there")
-        self._handle: Any = None
+        self._balls = DraggedBalls(view, "/fixed", lambda number, place: self._set(tuple(place.tolist()), number))
         by_click.on_click(view.step(lambda: setattr(view.click, "value", FIX_MODE)))
         view.modes[FIX_MODE] = self.place
         self.chosen.on_update(view.step(self._choose))
@@ -89,30 +90,11 @@ class FixedNodes:
         self._show(self._number() if self.chosen.value != NONE_CHOSEN else -1)
 
     def _show(self, number: int) -> None:
-        """Choose a fixed node, and give it a handle."""
+        """Choose a fixed node."""
         options = self.chosen.options
         self.chosen.value = options[number] if 0 <= number < len(options) and options[0] != NONE_CHOSEN else options[0]
-        if self._handle is not None:
-            self._handle.remove()
-            self._handle = None
-        if not 0 <= number < len(self._fixed):
-            return
-        place = np.array(self._fixed[number])
-        self.words.value = ", ".join(f"{c:.10g}" for c in place.tolist())
-        at = self.view.frame.to_scene(place[None])[0]
-        self._handle = self.view.scene.api.add_transform_controls(
-            "/dragged", scale=0.8, disable_rotations=True, depth_test=False, position=tuple(at.tolist())
-        )
-
-        def dragged(event: Any) -> None:
-            if event.phase == "end":
-                self.view.do(lambda: self._drop(np.array(event.target.position), number))
-
-        self._handle.on_update(dragged)
-
-    def _drop(self, at: np.ndarray, number: int) -> None:
-        """Move a fixed node to the point of the scan that is nearest to where it was dropped."""
-        self._set(tuple(self._scanned().nearest(self.view.frame.from_scene(at)).tolist()), number)
+        if 0 <= number < len(self._fixed):
+            self.words.value = ", ".join(f"{c:.10g}" for c in self._fixed[number])
 
     def fill(self, before: StudioState | None, state: StudioState) -> None:
         """Show the fixed nodes of a state."""
@@ -124,6 +106,5 @@ class FixedNodes:
         self.chosen.options = words or (NONE_CHOSEN,)
         if state.cloud is not None:
             places = np.array(fixed, float).reshape(-1, 3)
-            self.view.scene.balls("/fixed", SceneFrame.of(state.cloud).to_scene(places), FIXED_COLOR, FIXED_RADIUS)
-        if self._handle is not None:
-            self._show(int(kept) - 1 if kept.isdecimal() else -1)
+            self._balls.show(SceneFrame.of(state.cloud).to_scene(places), FIXED_COLOR, FIXED_RADIUS)
+        self._show(int(kept) - 1 if kept.isdecimal() else -1)

@@ -1,4 +1,4 @@
-"""A length field painted with a brush: round dabs of another member length on the scan."""
+"""A length field painted with a brush: dabs of another member length on the scan, by clicks or by dragging."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from ..scan.clean.thinning import thin_to
 from ..scan.cloud import PointCloud
 from ..settings import Settings
 from .colours import colors_of, legend_of
+from .dragging import place_under
 from .drawn_lines import ScannedPoints
 from .frame import SceneFrame
 from .picking import nearest_point
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 PAINT_MODE = "paint length"
 MOST_PAINTED = 1500  #: places at which a painted length is kept
 PAINTED_SIZE = 0.14  #: of such a place that is drawn [scene]
+UNSEEN = 0.01  #: opacity of the surface on which pointers are followed
 PLACE_DIGITS = 8  #: significant ones of a coordinate
 
 
@@ -65,7 +67,9 @@ def painted(cloud: PointCloud, settings: Settings, at: np.ndarray, radius: float
     away = np.linalg.norm(rows[:, :3] - at, axis=1)
     rows[(away <= radius) | (away == away.min()), 3] = length
     rows[:, 3] = [float(f"{each:.6g}") for each in rows[:, 3]]
-    return settings.replace(length=float(rows[:, 3].min()), length_field=tuple(map(tuple, rows.tolist())))
+    return settings.replace(
+        length=float(rows[:, 3].min()), length_field=tuple(map(tuple, rows.tolist())), rows_along=()
+    )
 
 
 class LengthBrush:
@@ -73,14 +77,18 @@ class LengthBrush:
 
     def __init__(self, view: StudioView, gui: Any) -> None:
         self.view = view
-        paint = gui.add_button("Paint by clicks", hint="then click on the scan: each click is a round dab")
+        paint = gui.add_button(
+            "Paint", hint="then click on the scan, or drag over the grid: each place gets a round dab"
+        )
         self.length = gui.add_text("length there", "", hint="in the unit of the scan; empty: half of the length above")
         self.radius = gui.add_text("radius", "", hint="of a dab, in the unit of the scan; empty: 4 members")
         none = gui.add_button("No field", hint="one length everywhere")
-        self.legend = gui.add_html("")
         paint.on_click(view.step(lambda: setattr(view.click, "value", PAINT_MODE)))
         none.on_click(view.step(lambda: view.session.set("no length field", length_field="")))
         view.modes[PAINT_MODE] = self._click
+        self._stroke: Settings | None = None  # while it is dragged
+        self._surface: Any = None  # an unseen one, for pointers are followed on bodies only
+        view.when_mode_changes(self._take_or_leave)
 
     def _number(self, text: Any, usual: float) -> float:
         try:
@@ -95,32 +103,80 @@ class LengthBrush:
         found = nearest_point(self.view.frame.to_scene(scanned), origin, ahead, self.view.near)
         if found is None:
             raise InputError("no point of the scan is there; click on the scan")
-        field = session.settings.length_field
-        usual = session.settings.length
+        self._finish(self._dabbed(session.settings, scanned[found]))
+
+    def _dabbed(self, settings: Settings, place: np.ndarray) -> Settings:
+        """Return settings with a dab at a place of the scan (3,)."""
+        cloud, field, usual = self.view.session.cloud, settings.length_field, settings.length
+        assert cloud is not None
         if field and not isinstance(field, str):
             rows = [row[3] for row in field]
             usual *= max(rows) / min(rows)
-        made = painted(
-            session.cloud, session.settings, scanned[found],
-            self._number(self.radius, 4.0 * usual), self._number(self.length, 0.5 * usual),
-        )  # fmt: skip
-        session.set("paint", length=made.length, length_field=made.length_field, rows_along=())
+        radius, length = self._number(self.radius, 4.0 * usual), self._number(self.length, 0.5 * usual)
+        return painted(cloud, settings, place, radius, length)
+
+    def _finish(self, made: Settings) -> None:
+        self.view.session.set("paint", length=made.length, length_field=made.length_field, rows_along=())
+
+    # ---- dragging
+
+    def _take_or_leave(self) -> None:
+        self._show_surface()
+        self._draw(self.view.session.settings)
+
+    def _show_surface(self) -> None:
+        """Follow pointers over the grid while the brush is in hand, and no longer then."""
+        grid = self.view.session.grid if self.view.click.value == PAINT_MODE else None
+        if self._surface is not None:
+            self._surface.remove()
+            self._surface = None
+        if grid is not None:
+            self._surface = self.view.scene.api.add_mesh_simple(
+                "/paint surface", self.view.frame.to_scene(grid.scan_nodes), grid.triangles.astype(np.uint32),
+                side="double", opacity=UNSEEN, cast_shadow=False, receive_shadow=False,
+            )  # fmt: skip
+            self._surface.on_drag("left")(self._dragged)
+
+    def _dragged(self, event: Any) -> None:
+        """Take the places under a pointer that is dragged: one step in all."""
+        if event.phase == "end":
+            made, self._stroke = self._stroke, None
+            if made is not None:
+                self.view.do(lambda: self._finish(made))
+            return
+        if event.phase == "start":
+            self._stroke = None
+        place = place_under(self.view, np.array(event.end_position), exactly=False)
+        if place is not None:
+            self.view.do_quietly(lambda: self._go_on(place))
+
+    def _go_on(self, place: np.ndarray) -> None:
+        self._stroke = self._dabbed(self._stroke or self.view.session.settings, place)
+        self._draw(self._stroke)
 
     def fill(self, before: StudioState | None, state: StudioState) -> None:
         """Show the painted lengths of a state."""
+        if before is None or before.grid is not state.grid:
+            self._show_surface()
         field, settings = state.settings.length_field, state.settings
         same = (
             before is not None and before.settings.length_field == field and before.settings.length == settings.length
         )
         if same and before is not None and before.cloud is state.cloud:
             return
-        self.view.scene.remove("/painted")
-        self.legend.content = ""
-        if state.cloud is None or not field or isinstance(field, str):
+        self._draw(settings)
+
+    def _draw(self, settings: Settings) -> None:
+        """Draw the painted lengths of some settings."""
+        field, cloud = settings.length_field, self.view.session.cloud
+        is_held = self.view.click.value == PAINT_MODE  # else it hides the grid
+        if cloud is None or not field or isinstance(field, str) or not is_held:
+            self.view.scene.remove("/painted")
+            self.view.legends.show("painted", "")
             return
         rows = np.array(field, float)
         lengths = rows[:, 3] * settings.length / rows[:, 3].min()
         colors, low, high = colors_of(lengths, None)
-        places = SceneFrame.of(state.cloud).to_scene(rows[:, :3])
+        places = SceneFrame.of(cloud).to_scene(rows[:, :3])
         self.view.scene.points("/painted", places, colors, PAINTED_SIZE)
-        self.legend.content = legend_of("painted length", state.cloud.unit, low, high, False)
+        self.view.legends.show("painted", legend_of("painted length", cloud.unit, low, high, False))

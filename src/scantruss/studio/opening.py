@@ -9,10 +9,12 @@ import numpy as np
 
 from ..errors import ScanTrussError
 from ..scan.cloud import PointCloud
+from ..scan.formats.own_colors import COLOR_ATTRIBUTES, PACKED_COLOR, own_colors
 from ..scan.formats.reading import read_content
 from ..scan.stream.fit import read_to_fit, spacing_to_fit, spacing_to_look
 from ..settings import Settings
 
+FILES_WITH_MARKS = (".las", ".laz", ".ply", ".pcd", ".e57", ".pts", ".ptx", ".xyz", ".txt", ".csv", ".parquet")
 DATA_FOLDER = Path(__file__).parents[1] / "data"
 EXAMPLES = {
     "shell": ("shell.ply", Settings(length=1.0, unit="m")),
@@ -29,15 +31,25 @@ def read_whole(path: Path) -> PointCloud:
     return cloud
 
 
-def classes_of(path: Path, cloud: PointCloud) -> np.ndarray | None:
-    """Return the classes of the points of a scan (N,), None where its file has none or some of its points were left out."""
-    if path.suffix.lower() not in (".las", ".laz"):
-        return None
+def marks_of(path: Path, cloud: PointCloud) -> tuple[np.ndarray | None, np.ndarray | None]:
+    """Return the classes (N,) and the colours (N, 3) uint8 of the points of a scan; None where its file has none.
+
+    Neither is known of a scan of several files, or of one that is thinned while it is read.
+    """
+    if Path(path.stem if path.suffix.lower() == ".gz" else path.name).suffix.lower() not in FILES_WITH_MARKS:
+        return None, None
     try:
-        found = read_content(path, ("class",)).attributes.get("class")
+        content = read_content(path, ("class", *COLOR_ATTRIBUTES, PACKED_COLOR))
     except ScanTrussError:  # several files, or one that is read otherwise
-        return None
-    return found if found is not None and len(found) == len(cloud.points) and len(np.unique(found)) > 1 else None
+        return None, None
+    kept = np.isfinite(content.points).all(axis=1)
+    if int(kept.sum()) != len(cloud.points):
+        return None, None
+    attributes = {name: values[kept] for name, values in content.attributes.items()}
+    classes = attributes.get("class")
+    if classes is not None and (path.suffix.lower() not in (".las", ".laz") or len(np.unique(classes)) < 2):
+        classes = None
+    return classes, own_colors(attributes)
 
 
 def next_free(place: Path, is_taken: Callable[[Path], bool] = lambda other: False) -> Path:

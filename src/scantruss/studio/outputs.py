@@ -10,11 +10,13 @@ from ..errors import InputError
 from ..export.formats import STRUCTURE, check_output, check_unit, model_of, suffixes_of, write
 from ..export.model import Model
 from ..runtime.files import temporary_folder
+from ..scan.formats.writing import write_points
 from ..settings import Settings
 from ..structure.options import settings_text
 from .project import save_project
 from .state import StudioState
 
+TAKEN = "taken.ply"  # the points that are taken, where some were removed by hand
 CLEANED = "clean.ply"  # the scan without the points that were removed
 
 
@@ -71,15 +73,26 @@ def project_file(state: StudioState, place: Path | None) -> dict[str, bytes]:
 def _of_the_file(state: StudioState) -> Settings:
     """Return the settings that make the grid from the file that is read: a cleaned one holds the chosen points only."""
     made = state.settings if state.grid is None or state.asked is None else state.asked
-    return made if state.cleaning is None else made.replace(classes=(), crop=())
+    is_whole = state.cleaning is None and state.removed is None
+    return made if is_whole else made.replace(classes=(), crop=())
 
 
 def settings_files(state: StudioState) -> dict[str, bytes]:
-    """Return the settings of the grid, and of the structure, where there is one, as the command line reads them."""
+    """Return the settings of the grid and of the structure as the command line reads them, and the points.
+
+    The points are there where some were removed by hand, which no option repeats.
+    """
     made = _of_the_file(state)
     files = {"grid.settings.json": (json.dumps(made.to_dict(), indent=1, ensure_ascii=False) + "\n").encode()}
     if state.solution is not None:
         files["structure.toml"] = settings_text(state.structure_settings).encode()
+    if state.removed is not None and state.cloud is not None:
+        with temporary_folder() as folder:
+            cloud = state.cloud
+            write_points(
+                folder / TAKEN, cloud.points + cloud.origin, normals=cloud.normals, unit=cloud.unit, origin=cloud.origin
+            )
+            files[TAKEN] = (folder / TAKEN).read_bytes()
     return files
 
 
@@ -87,7 +100,9 @@ def command_of(state: StudioState) -> str:
     """Return the command lines that repeat the grid and the structure with the files of `settings_files`."""
     name = Path(state.cloud.name).name if state.cloud is not None and state.cloud.name else "SCAN"
     made, lines = _of_the_file(state), []
-    if state.cleaning is not None:
+    if state.removed is not None:
+        name = TAKEN
+    elif state.cleaning is not None:
         chosen = state.settings
         taken = ["--class", ",".join(map(str, chosen.classes))] if chosen.classes else []
         taken += [word for part in chosen.crop for word in ("--crop", part)]

@@ -22,11 +22,12 @@ from ..scan.cloud import PointCloud
 from ..settings import Settings
 from ..structure.options import StructureSettings, read_structure_settings, settings_text
 from ..structure.statics import Solution
-from .scan_parts import Cleaning, WholeScan, part_of_scan
+from .scan_parts import Cleaning, WholeScan, part_of_scan, taken_of_scan
 from .state import Design, StudioState
 
-PROJECT_FORMAT, PROJECT_VERSION = "scantruss-project", 3
-PROJECT_PARTS = ("made_by.npy", "project.json", "scan.npz", "removed.npy", "structure.toml", "grid.json",
+PROJECT_FORMAT, PROJECT_VERSION = "scantruss-project", 4
+CLEANING_OF_PART = 3  #: last version in which a cleaning named the points of the part that was taken
+PROJECT_PARTS = ("made_by.npy", "project.json", "scan.npz", "removed.npy", "by_hand.npy", "structure.toml", "grid.json",
                  "structure.json")  # fmt: skip
 FIXED_DATE = (1980, 1, 1, 0, 0, 0)  # the same project gives the same bytes
 Part = TypeVar("Part")
@@ -52,6 +53,7 @@ def save_project(path: Path, state: StudioState) -> None:
         "cleaning": None if cleaning is None else [cleaning.outlier_distance, cleaning.loose_pieces],
         "settings": state.settings.to_dict(), "solved": solved, "quick": state.is_live,
         "asked": None if state.asked is None else state.asked.to_dict(),
+        "tape": [list(end) for end in state.tape],
         "designs": [{"name": each.name, "figures": [list(row) for row in each.figures]} for each in state.designs],
     }  # fmt: skip
     parts = {
@@ -62,6 +64,8 @@ def save_project(path: Path, state: StudioState) -> None:
     }
     if cleaning is not None:
         parts["removed.npy"] = _npy(np.packbits(cleaning.removes))
+    if state.removed is not None:
+        parts["by_hand.npy"] = _npy(np.packbits(state.removed))
     if state.grid is not None:
         parts["grid.json"] = _kept(_GRIDS, state.grid, encode_json)
     if solved and state.solution is not None:
@@ -91,6 +95,8 @@ def _encode_scan(whole: WholeScan) -> bytes:
         arrays["normals"] = cloud.normals
     if whole.classes is not None:
         arrays["classes"] = whole.classes
+    if whole.colors is not None:
+        arrays["colors"] = whole.colors
     return _zipped({f"{name}.npy": _npy(array) for name, array in arrays.items()}, zipfile.ZIP_DEFLATED)
 
 
@@ -137,28 +143,35 @@ def _project_of(parts: dict[str, bytes]) -> tuple[StudioState, bool]:
             left_out=tuple((str(why), int(count)) for why, count in scan["left_out"]),
         )  # fmt: skip
         classes = np.asarray(arrays["classes"]) if "classes" in arrays else None
+        colors = np.asarray(arrays["colors"], np.uint8).reshape(-1, 3) if "colors" in arrays else None
     if not len(cloud.points) or not np.isfinite(cloud.points).all():
         raise ValueError("points must be numbers")
     grid = _grid_of(parts["grid.json"]) if "grid.json" in parts else None
     asked, settings = head.get("asked"), Settings.from_dict(head["settings"])
-    whole, cleaning = WholeScan(cloud, classes), None
-    part = part_of_scan(whole, settings)
+    whole, cleaning = WholeScan(cloud, classes, colors), None
     if (numbers := head.get("cleaning")) is not None:
-        removes = np.unpackbits(np.load(io.BytesIO(parts["removed.npy"]), allow_pickle=False), count=len(part.points))
-        cleaning = Cleaning(float(numbers[0]), float(numbers[1]), removes.astype(np.bool_))
+        of = np.ones(len(cloud.points), np.bool_)
+        if head["format_version"] <= CLEANING_OF_PART:
+            of = taken_of_scan(whole, settings)
+        removes = np.zeros(len(of), np.bool_)
+        removes[of] = _bits(parts["removed.npy"], int(of.sum()))
+        cleaning = Cleaning(float(numbers[0]), float(numbers[1]), removes)
+    removed = _bits(parts["by_hand.npy"], len(cloud.points)) if "by_hand.npy" in parts else None
     state = StudioState(
-        part_of_scan(whole, settings, cleaning),
-        settings,
-        grid,
-        None if asked is None else Settings.from_dict(asked),
-        bool(head.get("quick", False)) and grid is not None,
-        _structure_settings_of(parts["structure.toml"]),
+        cloud=part_of_scan(whole, settings, cleaning, removed),
+        settings=settings,
+        grid=grid,
+        asked=None if asked is None else Settings.from_dict(asked),
+        is_live=bool(head.get("quick", False)) and grid is not None,
+        structure_settings=_structure_settings_of(parts["structure.toml"]),
         designs=tuple(
             Design(each["name"], _grid_of(parts[f"design-{k}.json"]), tuple((a, b) for a, b in each["figures"]))
             for k, each in enumerate(head.get("designs", ()), 1)
         ),
         whole=whole,
         cleaning=cleaning,
+        removed=removed,
+        tape=tuple(tuple(map(float, end)) for end in head.get("tape", ())),
     )
     return state, bool(head["solved"]) and grid is not None
 
@@ -175,6 +188,12 @@ def _structure_settings_of(content: bytes) -> StructureSettings:
         place = folder / "structure.toml"
         place.write_bytes(content)
         return read_structure_settings(place)
+
+
+def _bits(content: bytes, count: int) -> np.ndarray:
+    """Return so many truth values (N,) of a packed part."""
+    found: np.ndarray = np.unpackbits(np.load(io.BytesIO(content), allow_pickle=False), count=count).astype(np.bool_)
+    return found
 
 
 def _npy(array: np.ndarray) -> bytes:

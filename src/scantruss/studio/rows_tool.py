@@ -1,4 +1,4 @@
-"""The direction of the rows: an arrow on the scan, drawn by two clicks, whose head is dragged by a handle."""
+"""The direction of the rows: an arrow on the scan, drawn by two clicks, whose ends are dragged."""
 
 from __future__ import annotations
 
@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError
+from .dragging import DraggedBalls
 from .drawn_lines import ScannedPoints, numbers_of
 from .frame import SceneFrame
 from .picking import nearest_point
+from .scene import barbed
 
 if TYPE_CHECKING:
     from .state import StudioState
@@ -17,6 +19,8 @@ if TYPE_CHECKING:
 
 ROWS_MODE = "arrow of rows"
 ROWS_COLOR = (0, 110, 120)
+ROWS_WIDTH = 5.0  #: of the arrow [pixel]
+ROWS_RADIUS = 0.12  #: of the balls at the ends of the arrow [scene]
 
 
 class RowsTool:
@@ -24,16 +28,18 @@ class RowsTool:
 
     def __init__(self, view: StudioView, gui: Any) -> None:
         self.view = view
-        draw = gui.add_button("Draw an arrow", hint="then click two points of the scan; drag the handle at its head")
+        draw = gui.add_button(
+            "Draw an arrow", hint="then click two points of the scan; drag the balls at its ends to turn it"
+        )
         self.words = gui.add_text(
             "arrow", "", hint="x, y, z, dx, dy, dz: a place on the scan and a direction; empty: none"
         )
         none = gui.add_button("No arrow")
         self._begin: np.ndarray | None = None
-        self._handle: Any = None
+        self._balls = DraggedBalls(view, "/rows ends", self._drop, self._show)
         draw.on_click(view.step(self._start))
         none.on_click(view.step(lambda: view.session.set("no arrow", rows_along=())))
-        self.words.on_update(view.step(self._typed))
+        self.words.on_update(view.typed(self._typed))
         view.modes[ROWS_MODE] = self._click
 
     def _start(self) -> None:
@@ -64,15 +70,20 @@ class RowsTool:
         arrow = numbers_of(text, 6, "an arrow needs six numbers x, y, z, dx, dy, dz") if text else ()
         self.view.session.set("arrow of rows", rows_along=arrow)
 
-    def _dragged(self, event: Any) -> None:
-        if event.phase == "end":
-            self.view.do(lambda: self._drop(np.array(event.target.position)))
+    def _with(self, number: int, place: np.ndarray) -> np.ndarray:
+        """Return both ends of the arrow (2, 3) with one of them at another place [scan unit]."""
+        arrow = np.array(self.view.session.settings.rows_along, float)
+        ends = np.stack([arrow[:3], arrow[:3] + arrow[3:]])
+        ends[number] = place
+        return ends
 
-    def _drop(self, at: np.ndarray) -> None:
-        session = self.view.session
-        if session.cloud is not None and session.settings.rows_along:
-            end = ScannedPoints.of(session.cloud, session.settings).nearest(self.view.frame.from_scene(at))
-            self._set(np.array(session.settings.rows_along[:3]), end)
+    def _show(self, number: int, place: np.ndarray) -> None:
+        ends = self.view.frame.to_scene(self._with(number, place))
+        self.view.scene.chain("/rows arrow", ends, False, ROWS_COLOR, ROWS_WIDTH)
+
+    def _drop(self, number: int, place: np.ndarray) -> None:
+        begin, end = self._with(number, place)
+        self._set(begin, end)
 
     def fill(self, before: StudioState | None, state: StudioState) -> None:
         """Show the arrow of a state."""
@@ -80,15 +91,15 @@ class RowsTool:
         if before is not None and tuple(before.settings.rows_along) == arrow and before.cloud is state.cloud:
             return
         self.words.value = ", ".join(f"{number:.7g}" for number in arrow)
-        if self._handle is not None:
-            self._handle.remove()
-            self._handle = None
-        self.view.scene.remove("/rows", "/rows arrow")
+        self.view.scene.remove("/rows", "/rows arrow", "/rows ends")
         if not arrow or state.cloud is None:
             return
         ends = SceneFrame.of(state.cloud).to_scene(np.array([arrow[:3], np.add(arrow[:3], arrow[3:])]))
-        self.view.scene.arrows("/rows arrow", ends[1:], ends[1:] - ends[:1], ROWS_COLOR)
-        self._handle = self.view.scene.api.add_transform_controls(
-            "/rows head", scale=0.6, disable_rotations=True, depth_test=False, position=tuple(ends[1].tolist())
+        over = ScannedPoints.of(state.cloud, state.settings).along(
+            np.array([arrow[:3], np.add(arrow[:3], arrow[3:])]), state.settings.length
         )
-        self._handle.on_update(self._dragged)
+        line = SceneFrame.of(state.cloud).to_scene(over)
+        head = barbed(line[-1:], line[-1:] - line[-2:-1])
+        segments = np.concatenate([np.stack([line[:-1], line[1:]], axis=1), head])
+        self.view.scene.lines("/rows arrow", segments, np.array(ROWS_COLOR, np.uint8), ROWS_WIDTH)
+        self._balls.show(ends, np.array(ROWS_COLOR, np.uint8), ROWS_RADIUS)

@@ -1,4 +1,4 @@
-"""What is taken of a scan that was opened: by class and place, without points that cleaning removes."""
+"""What is taken of a scan that was opened: by class and place, without points that cleaning or a hand removes."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Cleaning:
 
     outlier_distance: float
     loose_pieces: float
-    removes: np.ndarray  #: (N,) bool, of the points that were taken before
+    removes: np.ndarray  #: (N,) bool, of the whole scan; of the points that are taken while it is proposed
     words: tuple[str, ...] = ()
 
     @property
@@ -38,6 +38,7 @@ class WholeScan:
 
     cloud: PointCloud
     classes: np.ndarray | None = None  #: (N,) of its points, where the file has them
+    colors: np.ndarray | None = None  #: (N, 3) uint8, where the file has them
 
     @property
     def held_classes(self) -> tuple[int, ...]:
@@ -66,8 +67,17 @@ def cleaning_of(cloud: PointCloud, outlier_distance: float, loose_pieces: float)
     )
 
 
-def part_of_scan(whole: WholeScan, settings: Settings, cleaning: Cleaning | None = None) -> PointCloud:
-    """Return the points that are taken, as if the file had been read with the classes and the crop of the settings.
+def taken_of_scan(
+    whole: WholeScan, settings: Settings, cleaning: Cleaning | None = None, removed: np.ndarray | None = None
+) -> np.ndarray:
+    """Return which points of a scan are taken (N,), as if the file had been read with the classes and the crop of the settings.
+
+    Parameters
+    ----------
+    cleaning : Cleaning, optional
+        That was done.
+    removed : (N,) bool, optional
+        Points that were removed by hand.
 
     Raises
     ------
@@ -75,6 +85,7 @@ def part_of_scan(whole: WholeScan, settings: Settings, cleaning: Cleaning | None
         No point is left.
     """
     cloud = whole.cloud
+    kept = np.ones(len(cloud.points), np.bool_)
     if settings.classes or settings.crop:
         places = cloud.points + cloud.origin
         attributes = {} if whole.classes is None else {"class": whole.classes}
@@ -87,8 +98,19 @@ def part_of_scan(whole: WholeScan, settings: Settings, cleaning: Cleaning | None
             raise InputError(
                 f"no point of {cloud.name or 'the scan'} is left: of {len(places):,} points {said}; the scan has{held}"
             )
-        cloud = _taken(cloud, kept)
-    return cloud if cleaning is None or not cleaning.removes.any() else _taken(cloud, ~cleaning.removes)
+    for goes in (None if cleaning is None else cleaning.removes, removed):
+        if goes is not None:
+            kept = kept & ~goes
+    if not kept.any():
+        raise InputError(f"no point of {cloud.name or 'the scan'} is left")
+    return kept
+
+
+def part_of_scan(
+    whole: WholeScan, settings: Settings, cleaning: Cleaning | None = None, removed: np.ndarray | None = None
+) -> PointCloud:
+    """Return the points that are taken; see `taken_of_scan`."""
+    return _taken(whole.cloud, taken_of_scan(whole, settings, cleaning, removed))
 
 
 def _taken(cloud: PointCloud, kept: np.ndarray) -> PointCloud:

@@ -7,16 +7,19 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..errors import InputError
 from ..runtime.files import temporary_folder
 from ..runtime.progress import Progress
 from ..scan.cloud import PointCloud
 from ..scan.member_length import length_range, suggest_length
 from ..settings import Settings
-from .opening import DATA_FOLDER, EXAMPLES, classes_of, next_free, read_whole
+from .opening import DATA_FOLDER, EXAMPLES, marks_of, next_free, read_whole
 from .project import read_project
 from .scan_parts import Cleaning, WholeScan, cleaning_of, part_of_scan
 from .solving import solved_state
+from .state import StudioState
 from .steps import Steps
 
 LARGEST_UPLOAD = 500_000_000  #: of a scan that comes through the page [bytes]
@@ -57,7 +60,7 @@ class ScanSteps(Steps):
             self.begin(solved_state(state) if solved else state)
             return
         cloud = read_whole(path)
-        self._start(WholeScan(cloud, classes_of(path, cloud)))
+        self._start(WholeScan(cloud, *marks_of(path, cloud)))
 
     def open_upload(self, name: str, content: bytes) -> None:
         """Open a scan or a project that came through the page, as a step of the worker."""
@@ -74,13 +77,44 @@ class ScanSteps(Steps):
                 path.write_bytes(content)
                 if path.suffix.lower() == ".scantruss":
                     state, solved = read_project(path)
-                    taken = solved_state(state) if solved else state
-                    self.change(f"open {own}", **vars(taken))
-                    self._saved_beside(own)
+                    number, place = self._place_for(own)
+                    self._open_state(f"open {own}", solved_state(state) if solved else state, number, place)
                     return
                 cloud = read_whole(path)
-                classes = classes_of(path, cloud)
-            self._start(WholeScan(replace(cloud, name=own), classes))
+                classes, colors = marks_of(path, cloud)
+            self._start(WholeScan(replace(cloud, name=own), classes, colors))
+            self._make("quick", progress, live=True)
+
+        self.worker.ask(read)
+
+    def open_path(self, name: str) -> None:
+        """Open a scan or a project of the folder of the project, as a step of the worker.
+
+        Raises
+        ------
+        InputError
+            It lies elsewhere, or nothing is there.
+        """
+        home = self.folder if self.place is None else self.place.parent
+        if home is None or not name.strip():
+            raise InputError("a path needs the name of a file in the folder of the project")
+        home = home.resolve()
+        path = (home / name.strip()).resolve()
+        if not path.is_relative_to(home):
+            raise InputError(f"only files within {home} are opened by path; open others with the button above")
+        if not path.is_file():
+            raise InputError(f"there is no file {name.strip()} in {home}")
+
+        def read(progress: Progress) -> None:
+            progress("read", 0.1)
+            if path.suffix.lower() == ".scantruss":
+                state, solved = read_project(path)
+                taken = solved_state(state) if solved else state
+                place = next_free(path, self.is_taken) if self.is_taken(path) else path
+                self._open_state(f"open {path.name}", taken, max(self._places) + 1, place)
+                return
+            cloud = read_whole(path)
+            self._start(WholeScan(cloud, *marks_of(path, cloud)))
             self._make("quick", progress, live=True)
 
         self.worker.ask(read)
@@ -98,16 +132,29 @@ class ScanSteps(Steps):
     def _start(self, whole: WholeScan, settings: Settings | None = None) -> None:
         cloud = whole.cloud
         made = settings or Settings(length=suggest_length(cloud), unit=cloud.unit)
-        self.change(f"open {cloud.name}", whole=whole, cloud=cloud, cleaning=None, settings=made, **NO_GRID)
+        state = replace(
+            self.state, whole=whole, cloud=cloud, cleaning=None, removed=None, tape=(), settings=made, **NO_GRID
+        )
+        number, place = self._place_for(cloud.name or "scan")
+        self._open_state(f"open {cloud.name}", state, number, place)
+
+    def _place_for(self, name: str) -> tuple[int, Path | None]:
+        """Return the number of what is being opened and its project file: the given one, or one of its own beside it."""
+        place, number = self.place, max(self._places) + 1
+        if self.cloud is None and place is not None:  # the project that was named has no scan yet
+            return self.state.opened, place
+        folder = self.folder if place is None else place.parent
+        if folder is None:
+            return number, None
+        wished = folder / f"{Path(name).stem}.scantruss"
+        return number, next_free(wished) if wished.exists() else wished
+
+    def _open_state(self, words: str, state: StudioState, number: int, place: Path | None) -> None:
+        """Go on with a state that was opened."""
+        self._places[number] = place
+        self.change(words, **vars(state) | {"opened": number})
         self._turn += 1
         self._forget_features()
-        self._saved_beside(cloud.name or "scan")
-
-    def _saved_beside(self, name: str) -> None:
-        """Choose a project file, where there is none yet, and save."""
-        if self.place is None and self.folder is not None:
-            place = self.folder / f"{Path(name).stem}.scantruss"
-            self.place = next_free(place) if place.exists() else place
         self.save()
 
     def set_unit(self, unit: str) -> None:
@@ -140,15 +187,15 @@ class ScanSteps(Steps):
         InputError
             A part of space cannot be read, or no point lies in it.
         """
-        self._take("crop" if words else "no crop", self.settings.replace(crop=words))
+        self._take("crop" if words else "no crop", self.settings.replace(crop=words), None, self.state.removed)
 
     def choose_classes(self, classes: tuple[int, ...]) -> None:
         """Take the points of some classes; none: all of them."""
         held = () if self.state.whole is None else self.state.whole.held_classes
         if held and not set(classes) - set(held) and set(classes) != set(held):
-            self._take("classes", self.settings.replace(classes=classes))
+            self._take("classes", self.settings.replace(classes=classes), None, self.state.removed)
         else:
-            self._take("all classes", self.settings.replace(classes=()))
+            self._take("all classes", self.settings.replace(classes=()), None, self.state.removed)
 
     def propose_cleaning(self, outlier_distance: float, loose_pieces: float) -> None:
         """Look for points that a cleaning would remove, which are shown before they go."""
@@ -184,18 +231,50 @@ class ScanSteps(Steps):
             raise InputError("nothing is shown in red yet; press Show what goes")
         if self.state.cleaning is not None:
             raise InputError("the scan has been cleaned already; take that back with Undo to clean it otherwise")
-        self._take("clean", self.settings, proposal)
+        removes = self.state.taken()
+        removes[removes] = proposal.removes
+        self._take("clean", self.settings, replace(proposal, removes=removes), self.state.removed)
 
-    def _take(self, words: str, settings: Settings, cleaning: Cleaning | None = None) -> None:
+    def remove_points(self, goes: np.ndarray) -> None:
+        """Remove some of the points that are taken (M,) bool.
+
+        Raises
+        ------
+        InputError
+            None are named, or none would be left.
+        """
+        if self.state.whole is None:
+            raise InputError("there is no scan yet; open one")
+        if not goes.any():
+            raise InputError("no points are marked; press Mark and drag a rectangle with Shift held")
+        removed = self.state.taken()
+        removed[removed] = goes
+        if self.state.removed is not None:
+            removed |= self.state.removed
+        self._take("remove points", self.settings, self.state.cleaning, removed)
+
+    def restore_points(self) -> None:
+        """Take the points again that were removed by hand."""
+        self._take("restore points", self.settings, self.state.cleaning, None)
+
+    def measure(self, ends: tuple[tuple[float, ...], ...]) -> None:
+        """Lay the tape between two places in the frame of the scan; none: put it away."""
+        if ends == self.state.tape:
+            return
+        self.change("tape", tape=ends)
+        self.save()
+        self.tell()
+
+    def _take(self, words: str, settings: Settings, cleaning: Cleaning | None, removed: np.ndarray | None) -> None:
         """Take a part of the scan; a crop or a choice of classes comes before cleaning, and so forgets it."""
         whole = self.state.whole
         if whole is None:
             raise InputError("there is no scan yet; open one")
-        part = part_of_scan(whole, settings, cleaning)
+        part = part_of_scan(whole, settings, cleaning, removed)
         self.stop()
         self._turn += 1
         self._forget_features()
-        self.change(words, cloud=part, cleaning=cleaning, settings=settings, **NO_GRID)
+        self.change(words, cloud=part, cleaning=cleaning, removed=removed, settings=settings, **NO_GRID)
         self.save()
         self.tell()
         self.show_quick()

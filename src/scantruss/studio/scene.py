@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -22,16 +22,26 @@ GRID_PARTS = (
 )  # fmt: skip
 PANEL_COLOR = (205, 216, 223)
 SELECTED_COLOR = (230, 97, 1)
-LINE_WIDTH, WIDE = 3.0, 7.0  #: of members and of what stands out [pixel]
+LINE_WIDTH, WIDE, FAINT = 3.0, 7.0, 1.0  #: of members, of what stands out, of what only shows where it was [pixel]
 TUBE_RADIUS, BALL_RADIUS = 0.05, 0.09  #: of members and nodes drawn as bodies [mean member length]
-DRAWN_POINTS = 100_000  #: of the scan
+DRAWN_POINTS, FIRST_POINTS = 100_000, 20_000  #: of the scan; of its first picture
 MOST_DRAWN_LINES = 4000  #: members that are drawn as lines
-MOST_BEADS = 44_000  #: points by which so many members are drawn
+MOST_BEADS = 33_000  #: points by which so many members are drawn
 BEADS, BEAD_SIZE = (
-    (4, 12),
-    1.2,
+    (3, 12),
+    0.6,
 )  #: points of such a member at least and at most, and how large they are [their distance]
 TUBE_SIDES = 8
+BODY_GAMMA, PANEL_GAMMA = 2.2, 1.45  #: exponents of colours, see `lit`
+SKY_LIGHT = 0.3  #: share of the light that comes from the sky
+PLAIN_LIGHT = 2.0  #: on all sides of bodies, without a sky
+SKY_COLORS = {
+    False: ((150, 188, 222), (243, 246, 248)),
+    True: ((16, 24, 38), (52, 60, 72)),
+}  #: of a light and a dark page, up and down
+SKY_ROWS = 64  #: of its picture [pixel]
+GROUND_SIZE, GROUND_SHADOW = 60.0, 0.25  #: of the ground [scene], and how dark shadows are on it
+BARB_LENGTH, BARB_WIDTH = 0.16, 0.05  #: of the head of an arrow that is drawn by lines [scene]
 DRAWN_SHARE = 0.93  #: of a panel about its middle, so that it does not cover its members
 OCTAHEDRON = np.array([[1, 0, 0], [0, 1, 0], [-1, 0, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], np.float32)
 BALL_FACES = np.array(
@@ -48,33 +58,35 @@ class Scene:
         self.light(False)
         self._scan_key: tuple[Any, ...] = ()
         self._draws_front = False
-        self._scan_scale: tuple[str, float, float] | None = None
+        self._scan_legend = ""
 
-    def scan(self, state: StudioState, wanted: str, section: SectionPlane | None) -> tuple[str, float, float] | None:
-        """Draw the scan of a state, thinned, and return words and ends of the scale of its colours, where there is one.
+    def scan(self, state: StudioState, wanted: str, section: SectionPlane | None, most: int = DRAWN_POINTS) -> str:
+        """Draw the scan of a state, thinned, and return the legend of its colours, where there is one.
 
         Parameters
         ----------
         wanted : str
-            Of `SCAN_COLOURINGS`.
+            Of `colorings_of_scan`.
+        most : int
+            Points that are drawn.
         """
         assert state.cloud is not None
-        key = (state.cloud, wanted, state.grid if wanted == FROM_GRID else None, section)
+        key = (state.cloud, wanted, state.grid if wanted == FROM_GRID else None, section, most)
         if key == self._scan_key:
-            return self._scan_scale
-        taken = np.arange(0, len(state.cloud.points), max(1, -(-len(state.cloud.points) // DRAWN_POINTS)))
-        colors, scale = colors_of_scan(state.cloud, taken, state.grid, state.settings, wanted)
+            return self._scan_legend
+        taken = np.arange(0, len(state.cloud.points), max(1, -(-len(state.cloud.points) // most)))
+        colors, legend = colors_of_scan(state, taken, wanted)
         places = SceneFrame.of(state.cloud).to_scene(state.cloud.points[taken] + state.cloud.origin)
         if section is not None:
             kept = section.keeps(places)
             places, colors = places[kept], colors[kept]
         self.points("/scan", places, np.ascontiguousarray(colors), 0.02)
-        self._scan_key, self._scan_scale = key, scale
-        return scale
+        self._scan_key, self._scan_legend = key, legend
+        return legend
 
     def remove_scan(self) -> None:
         """Draw no scan."""
-        self._scan_key, self._scan_scale = (), None
+        self._scan_key, self._scan_legend = (), ""
         self.remove("/scan")
 
     def remove(self, *names: str) -> None:
@@ -82,15 +94,30 @@ class Scene:
         for name in names:
             self.api.remove_by_name(name)
 
-    def light(self, is_fine: bool) -> None:
-        """Light bodies as in daylight with shadows, or plainly: reflections of a sky cost most of the time of a slow machine."""
-        self.api.configure_environment_map("warehouse" if is_fine else None)
-        self.api.configure_default_lights(True, cast_shadow=is_fine)
+    def light(self, is_fine: bool, is_dark: bool = False, ground: float = 0.0) -> None:
+        """Light bodies by day, under a sky and with shadows on the ground, or plainly, which costs a slow machine least.
 
-    def members(self, name: str, ends: np.ndarray, colors: np.ndarray) -> None:
+        Parameters
+        ----------
+        ground : float
+            Height of the ground [scene].
+        """
+        self.api.configure_environment_map("park" if is_fine else None, environment_intensity=SKY_LIGHT)
+        self.api.configure_default_lights(True, cast_shadow=is_fine)
+        self.api.add_light_ambient("/daylight", intensity=0.0 if is_fine else PLAIN_LIGHT)
+        self.api.set_background_image(sky(is_dark) if is_fine else None)
+        if is_fine:
+            self.api.add_grid(
+                "/ground", GROUND_SIZE, GROUND_SIZE, cell_thickness=0.0, section_thickness=0.0, fade_strength=0.0,
+                shadow_opacity=GROUND_SHADOW, position=(0.0, 0.0, ground),
+            )  # fmt: skip
+        else:
+            self.remove("/ground")
+
+    def members(self, name: str, ends: np.ndarray, colors: np.ndarray, width: float = LINE_WIDTH) -> None:
         """Draw the members (M, 2, 3) of a grid: as lines, or where these are too many as rows of points, which cost less."""
         few, many = (ends, ends[:0]) if len(ends) <= MOST_DRAWN_LINES else (ends[:0], ends)
-        self.lines(name, few, colors[: len(few)])
+        self.lines(name, few, colors[: len(few)], width)
         beads = int(np.clip(MOST_BEADS // max(len(many), 1), *BEADS))
         step = float(np.linalg.norm(many[:, 1] - many[:, 0], axis=1).mean()) / beads if len(many) else 1.0
         share = ((np.arange(beads) + 0.5) / beads)[None, :, None]
@@ -100,14 +127,22 @@ class Scene:
             places.astype(np.float32),
             np.repeat(colors[: len(many)], beads, axis=0),
             BEAD_SIZE * step,
+            "square",  # a fifth of the time of a picture less than circles
         )
 
-    def points(self, name: str, places: np.ndarray, colors: np.ndarray, size: float) -> None:
+    def points(
+        self,
+        name: str,
+        places: np.ndarray,
+        colors: np.ndarray,
+        size: float,
+        shape: Literal["circle", "square"] = "circle",
+    ) -> None:
         """Draw points (N, 3) in colours (N, 3) or one."""
         if not len(places):
             self.remove(name)
             return
-        self.api.add_point_cloud(name, places, colors, point_size=size, point_shape="circle", precision="float32")
+        self.api.add_point_cloud(name, places, colors, point_size=size, point_shape=shape, precision="float32")
 
     def thinned(self, name: str, places: np.ndarray, color: np.ndarray) -> None:
         """Draw the points of a scan (N, 3), thinned, in one colour."""
@@ -152,7 +187,7 @@ class Scene:
             turns_from_z(spans / np.maximum(sizes, 1e-12)[:, None]),
             ends[:, 0].astype(np.float32),
             batched_scales=np.stack([np.full_like(sizes, radius), np.full_like(sizes, radius), sizes], axis=1),
-            batched_colors=np.array(np.broadcast_to(colors, (len(ends), 3)), np.uint8),
+            batched_colors=lit(np.broadcast_to(colors, (len(ends), 3)), BODY_GAMMA),
             lod="off",
         )
 
@@ -165,7 +200,7 @@ class Scene:
         self.api.add_batched_meshes_simple(
             name, corners, faces, np.tile([1.0, 0.0, 0.0, 0.0], (len(places), 1)), places.astype(np.float32),
             batched_scales=np.full(len(places), radius),
-            batched_colors=np.array(np.broadcast_to(colors, (len(places), 3)), np.uint8), lod="off",
+            batched_colors=lit(np.broadcast_to(colors, (len(places), 3)), BODY_GAMMA), lod="off",
         )  # fmt: skip
 
     def panels(
@@ -188,7 +223,7 @@ class Scene:
         import trimesh
 
         body = trimesh.Trimesh(corners, faces, process=False)
-        rgba = np.concatenate([np.repeat(colors, 3, axis=0), np.full((len(corners), 1), 255)], axis=1)
+        rgba = np.concatenate([np.repeat(lit(colors, PANEL_GAMMA), 3, axis=0), np.full((len(corners), 1), 255)], axis=1)
         body.visual.vertex_colors = rgba.astype(np.uint8)
         self.api.add_mesh_trimesh(f"{name} coloured", body)
 
@@ -229,6 +264,42 @@ class Scene:
             name, np.stack([places - along, places], axis=1).astype(np.float32), color,
             shaft_radius=2 * reach, head_radius=5 * reach, head_length=12 * reach,
         )  # fmt: skip
+
+
+def lit(colors: np.ndarray, gamma: float) -> np.ndarray:
+    """Return the colours (N, 3) uint8 of bodies that look like some colours (N, 3) by daylight: the page takes theirs as light."""
+    return np.rint(255.0 * (np.asarray(colors, float) / 255.0) ** gamma).astype(np.uint8)
+
+
+def sky(is_dark: bool, rows: int = SKY_ROWS) -> np.ndarray:
+    """Return a sky (rows, 1, 3) uint8, paler towards the ground."""
+    high, low = np.array(SKY_COLORS[is_dark], float)
+    return np.rint(high + np.linspace(0.0, 1.0, rows)[:, None, None] * (low - high)).astype(np.uint8)
+
+
+def barbed(places: np.ndarray, along: np.ndarray) -> np.ndarray:
+    """Return segments (5 N, 2, 3) that draw arrows (N, 3) which end at places (N, 3): a shaft and four barbs each."""
+    size = np.linalg.norm(along, axis=1, keepdims=True)
+    ahead = along / np.maximum(size, 1e-12)
+    steep = np.abs(ahead[:, 2:]) > 0.9
+    aside = np.cross(ahead, np.where(steep, [[1.0, 0.0, 0.0]], [[0.0, 0.0, 1.0]]))
+    aside /= np.maximum(np.linalg.norm(aside, axis=1, keepdims=True), 1e-12)
+    across = np.cross(ahead, aside)
+    back = places - np.minimum(BARB_LENGTH, 0.4 * size) * ahead
+    ends = [places - along, *(back + BARB_WIDTH * side for side in (aside, -aside, across, -across))]
+    return np.stack([np.stack([end, places], axis=1) for end in ends], axis=1).reshape(-1, 2, 3)
+
+
+def spread(places: np.ndarray, most: int) -> np.ndarray:
+    """Return about `most` of some places (N, 3) at most, far from one another: their numbers (K,)."""
+    if len(places) <= most:
+        return np.arange(len(places))
+    taken = [0]
+    away = np.full(len(places), np.inf)
+    for _ in range(most - 1):
+        away = np.minimum(away, ((places - places[taken[-1]]) ** 2).sum(axis=1))
+        taken.append(int(away.argmax()))
+    return np.array(taken)
 
 
 def round_ball() -> tuple[np.ndarray, np.ndarray]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import hmac
 import http
 import secrets
@@ -9,6 +10,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from http.cookies import CookieError, SimpleCookie
 from importlib.util import find_spec
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import parse_qs, urlsplit
 
@@ -20,6 +22,7 @@ if TYPE_CHECKING:
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 COOKIE = "scantruss_studio"
 BROWSER_KEY = "scantruss_browser"
+DROP_SCRIPT = Path(__file__).with_name("drop.js")
 STORAGE_PATIENCE = 5.0  #: how long a browser may take to say who it is [s]
 Handler = Callable[[Any, Any], Any]
 
@@ -46,6 +49,7 @@ class Guard:
     """
 
     def __init__(self, host: str) -> None:
+        self._pages: dict[bool, tuple[bytes, bytes]] = {}  # as viser has them and as they are served
         self.token = "" if host in LOOPBACK else secrets.token_urlsafe(24)
 
     def refusal(self, path: str, headers: Any) -> str:
@@ -70,6 +74,17 @@ class Guard:
             return "the token is missing or wrong; open the address that scantruss studio printed"
         return ""
 
+    def _add_script(self, answer: Any) -> None:
+        """Give a page the script of dropped files; pages that were served before are remembered."""
+        is_packed = answer.headers.get("Content-Encoding") == "gzip"
+        if (kept := self._pages.get(is_packed)) is None or kept[0] != answer.body:
+            page = gzip.decompress(answer.body) if is_packed else answer.body
+            page = page.replace(b"<head>", b"<head><script>{" + DROP_SCRIPT.read_bytes() + b"}</script>", 1)
+            kept = self._pages[is_packed] = (answer.body, gzip.compress(page) if is_packed else page)
+        answer.body = kept[1]
+        del answer.headers["Content-Length"]
+        answer.headers["Content-Length"] = str(len(answer.body))
+
     @staticmethod
     def _given(path: str, headers: Any) -> str:
         """Return the token of a request: of its address, or of the cookie that the first answer set."""
@@ -92,8 +107,10 @@ class Guard:
                 return Response(http.HTTPStatus.FORBIDDEN, "Forbidden", head, f"{words}\n".encode())
             answer = inner(connection, request)
             if answer is not None:
+                if answer.headers.get("Content-Type", "").startswith("text/html"):
+                    self._add_script(answer)
                 answer.headers["Referrer-Policy"] = "no-referrer"
-                answer.headers["X-SceneFrame-Options"] = "DENY"
+                answer.headers["X-Frame-Options"] = "DENY"
                 if self.token:
                     answer.headers["Set-Cookie"] = f"{COOKIE}={self.token}; HttpOnly; SameSite=Strict; Path=/"
             return answer

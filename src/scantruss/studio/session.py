@@ -57,6 +57,12 @@ class Session(ScanSteps):
         self.tell()
         self._ask_live()
 
+    def set_quietly(self, words: str, **changes: Any) -> None:
+        """Change settings that a quick grid does not heed."""
+        self.change(words, settings=self.settings.replace(**changes))
+        self.save()
+        self.tell()
+
     def live(self, length: float) -> bool:
         """Make a quick grid of a length, unless a run that was asked for is under way; the newest request wins."""
         self.change("slider", goes_on=True, settings=self.settings.replace(length=length))

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from ..grid.grid import Grid
 from ..scan.cloud import PointCloud
 from ..settings import Settings
 from ..structure.options import StructureSettings
 from ..structure.report import StructureReport
 from ..structure.statics import Solution
-from .scan_parts import Cleaning, WholeScan
+from .scan_parts import Cleaning, WholeScan, taken_of_scan
 
 MOST_UNDONE = 200  #: that can be taken back
 NO_LENGTH = Settings(length=1.0)  #: of a studio without a scan
@@ -31,6 +33,7 @@ class StudioState:
     """What a studio works on."""
 
     cloud: PointCloud | None = None
+    opened: int = 0  #: how many scans and projects were opened before it and with it; each has a project file
     settings: Settings = NO_LENGTH
     grid: Grid | None = None
     asked: Settings | None = None  #: with which the grid was asked for; its own say what was done to get it
@@ -40,7 +43,16 @@ class StudioState:
     report: StructureReport | None = None
     designs: tuple[Design, ...] = ()
     whole: WholeScan | None = None  #: as it was opened; `cloud` is what is taken of it
-    cleaning: Cleaning | None = None  #: what was removed last
+    cleaning: Cleaning | None = None  #: what was cleaned last
+    removed: np.ndarray | None = None  #: (N,) bool, points of the whole scan that were removed by hand
+    tape: tuple[
+        tuple[float, ...], ...
+    ] = ()  #: both ends of what was measured last, in the frame of the scan [scan unit]
+
+    def taken(self) -> np.ndarray:
+        """Return which points of the whole scan are taken (N,)."""
+        assert self.whole is not None
+        return taken_of_scan(self.whole, self.settings, self.cleaning, self.removed)
 
     @property
     def is_stale(self) -> bool:

@@ -30,8 +30,10 @@ class Steps:
     """
 
     def __init__(self, project: Path | None = None, *, folder: Path | None = None) -> None:
-        self.place, self.folder = project, folder
+        self.folder = folder
         self.state = StudioState()
+        self._places: dict[int, Path | None] = {self.state.opened: project}
+        self.is_taken: Callable[[Path], bool] = lambda place: False  #: whether another browser saves a project there
         self.history = History()
         self.message = ""  #: why the last step was refused, in the words of the command line
         self.stage, self.share = "", 0.0
@@ -39,6 +41,11 @@ class Steps:
         self._listeners: list[Callable[[], None]] = []
         self._turn = 0  # counts what makes the result of a running task unwanted
         self._lock, self._saving = RLock(), RLock()
+
+    @property
+    def place(self) -> Path | None:
+        """The file in which the project is saved; None where it is not."""
+        return self._places.get(self.state.opened)
 
     @property
     def cloud(self) -> PointCloud | None:
@@ -97,6 +104,7 @@ class Steps:
     def begin(self, state: StudioState) -> None:
         """Begin with a state, with nothing to take back."""
         with self._lock:
+            self._places = {state.opened: self.place}
             self.state, self.history, self._turn = state, History(), self._turn + 1
 
     def undo(self) -> None:

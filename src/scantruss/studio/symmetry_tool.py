@@ -31,7 +31,7 @@ class SymmetryTool:
         )
         self._count = 0
         self.way.on_update(view.step(self._set))
-        self.words.on_update(view.step(lambda: self._set() if self.way.value == SYMMETRIES[2] else None))
+        self.words.on_update(view.typed(lambda: self._set() if self.way.value == SYMMETRIES[2] else None))
 
     def _set(self) -> None:
         way, session = self.way.value, self.view.session

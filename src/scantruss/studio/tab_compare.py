@@ -31,7 +31,6 @@ class CompareTab:
         )
         self.over = gui.add_checkbox("over the present one", False, hint="in its place instead of beside it")
         self.distance = gui.add_checkbox("colour by distance", False, hint="of its nodes from the present one")
-        self.legend = gui.add_html("")
         drop = gui.add_button("Forget that design")
         self.table = gui.add_html("")
         keep.on_click(view.step(lambda: view.session.keep_design(self.name.value)))
@@ -82,8 +81,8 @@ class CompareTab:
 
     def _draw(self, state: StudioState) -> None:
         scene, chosen = self.view.scene, self._chosen(state)
-        self.legend.content = ""
         if chosen is None or state.cloud is None:
+            self.view.legends.show("beside", "")
             scene.remove("/beside/members", "/beside/panels", "/beside/name")
             return
         frame = self.view.frame
@@ -94,11 +93,22 @@ class CompareTab:
         if self.distance.value and state.grid is not None:
             values = deviation(chosen.grid, state.grid)[chosen.grid.edges].mean(axis=1)
             words = "distance from the present design"
-        colors, low, high = colors_of(values, None)
-        self.legend.content = legend_of(f"{chosen.name}: {words}", chosen.grid.unit, low, high, False)
+        colors, low, high = colors_of(values, None, self.ends)
+        legend = legend_of(f"{chosen.name}: {words}", chosen.grid.unit, low, high, False)
+        self.view.legends.show("beside", legend)
         scene.lines("/beside/members", nodes[chosen.grid.edges], colors)
         scene.panels("/beside/panels", nodes, chosen.grid.triangles, None, 0.25)
         scene.api.add_label("/beside/name", chosen.name, position=tuple((nodes.max(axis=0)).tolist()))
+
+    @property
+    def ends(self) -> tuple[float, float] | None:
+        """Ends of one scale of member lengths, of the present design and the one beside it; None where none is."""
+        state = self.view.session.state
+        chosen = self._chosen(state)
+        if chosen is None or state.grid is None or self.distance.value:
+            return None
+        both = np.concatenate([chosen.grid.lengths, state.grid.lengths])
+        return float(both.min()), float(both.max())
 
     def _chosen(self, state: StudioState) -> Design | None:
         return next((each for each in state.designs if each.name == self.other.value), None)

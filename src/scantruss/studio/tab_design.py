@@ -34,10 +34,8 @@ class DesignTab:
         with gui.add_folder("Length brush", expand_by_default=False):
             self.brush = LengthBrush(view, gui)
         self.slider.on_update(step(self._slide))
-        self.length.on_update(step(self._typed))
-        self.effort.on_update(
-            step(lambda: session.change("effort", settings=session.settings.replace(effort=self.effort.value)))
-        )
+        self.length.on_update(view.typed(self._typed))
+        self.effort.on_update(step(lambda: session.set_quietly("effort", effort=self.effort.value)))
         self.prefer.on_update(step(lambda: session.set("prefer", prefer=self.prefer.value)))
 
     def _slide(self) -> None:
@@ -84,4 +82,8 @@ class DesignTab:
             f"length {quality.length_mean:.4g}{unit}, CV {quality.length_cv:.4f}, G {quality.shape_mean:.4f}"
         )
         if certificate is not None:
-            self.figures.content += "\n\ncertificate: " + ("passed" if certificate.passed else "**failed**")
+            count = len(certificate.warnings)
+            warned = f" with {count} warning{'s' * (count > 1)}: Grid, Certificate" if count else ""
+            self.figures.content += (
+                f"\n\ncertificate: passed{warned}" if certificate.passed else "\n\ncertificate: **failed**"
+            )

@@ -2,28 +2,33 @@
 
 from __future__ import annotations
 
-import io
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import InputError
 from ..export.page_tables import PageColumn, colorings_of
 from .certificate_list import CertificateList
-from .colours import DIMMED, colors_of, histogram_of, legend_of, values_of
+from .colours import DIMMED, colors_of, histogram_of, legend_of, legend_of_more, rgb_of, values_of
 from .frame import SectionPlane
-from .scene import BALL_RADIUS, GRID_PARTS, MOST_DRAWN_LINES, TUBE_RADIUS, cut, drawn_colors, plain_colors
+from .pictures import PictureTool
+from .scene import (
+    BALL_RADIUS,
+    FAINT,
+    GRID_PARTS,
+    LINE_WIDTH,
+    MOST_DRAWN_LINES,
+    TUBE_RADIUS,
+    cut,
+    drawn_colors,
+    plain_colors,
+)
 
 if TYPE_CHECKING:
     from .state import StudioState
     from .view import StudioView
 
-PLAIN_GRID = "plain"
+PLAIN_GRID, BY_LENGTH = "plain", "member length"
 WHOLE = "none"
-LARGE_PICTURE = (2160, 3840)  #: height and width of a picture [pixel]
-TURN_SIZE = (540, 960)  #: height and width of a turntable [pixel]
-TURN_FRAMES, TURN_MILLISECONDS = 36, 100  #: of a turntable, and how long each is shown
-PICTURE_PATIENCE = 120.0  #: how long the browser may take for a picture [s]
 
 
 class GridTab:
@@ -46,16 +51,14 @@ class GridTab:
         self.axis = gui.add_dropdown("section across", (WHOLE, "x", "y", "z"))
         self.at = gui.add_slider("section at", 0.0, 1.0, 0.01, 0.5)
         self.dark = gui.add_checkbox("dark page", False)
-        picture, turn = gui.add_button("Picture, 3840 x 2160"), gui.add_button("Turntable, GIF")
+        PictureTool(view, gui)
         for each in (self.members, self.panels, self.nodes, self.tubes, self.axis, self.at, self.range):
             each.on_update(step(self.draw))
         self.coloring.on_update(step(lambda: self._chosen(view.session.state)))
         for each in (self.axis, self.at):
             each.on_update(step(lambda: view.scan.draw()))
-        self.tubes.on_update(step(lambda: view.scene.light(self.tubes.value)))
+        self.tubes.on_update(step(self._light))
         self.dark.on_update(step(self._theme))
-        picture.on_click(step(self._picture))
-        turn.on_click(step(self._turntable))
 
     # ---- drawing
 
@@ -88,9 +91,9 @@ class GridTab:
             values, middle = values_of(column), self._choices[self.coloring.value].get("middle")
             _, low, high = colors_of(values, middle)
             self._values = values
-            step = (high - low) / 200 or 0.01
-            self.range.min, self.range.max, self.range.step = low, high + step, step
-            self.range.value = (low, high + step)
+            begin, end, step = round_ends(low, high)
+            self.range.min, self.range.max, self.range.step = begin, end, step
+            self.range.value = (begin, end)
             self.legend.content = legend_of(self.coloring.value, column.unit, low, high, middle is not None)
             self.bars.content = histogram_of(values, low, high, middle is not None)
         self.draw()
@@ -115,13 +118,25 @@ class GridTab:
         scene, shown = self.view.scene, self.view.shown_model()
         if shown is None:
             scene.remove(*GRID_PARTS)
+            self.view.legends.show("grid", "")
             return
         model, _ = shown
         places = self.view.places(model)
+        legend = ""
         colors: dict[str, np.ndarray | None] = {"members": None, "nodes": None, "panels": None}
         if self._values is not None:
             choice = self._choices[self.coloring.value]
-            own, low, high = colors_of(self._values, choice.get("middle"))
+            middle, unit = choice.get("middle"), getattr(self._column(), "unit", "")
+            _, low, high = colors_of(self._values, middle)
+            scale_ends = self.view.compare.ends if choice["words"] == BY_LENGTH else None
+            most, too_much = choice.get("most", (np.inf, ""))
+            if high > most:
+                scale_ends = (min(low, most), most)
+            own, *shown_ends = colors_of(self._values, middle, scale_ends)
+            own[self._values > most] = rgb_of(too_much) if high > most else 0
+            legend = legend_of(self.coloring.value, unit, shown_ends[0], shown_ends[1], middle is not None)
+            legend += legend_of_more(most, too_much) if high > most else ""
+            self.legend.content = legend
             begin, end = self.range.value
             is_whole = begin <= low and end >= high
             selected = None if is_whole else (self._values >= begin) & (self._values <= end)
@@ -130,6 +145,8 @@ class GridTab:
             self.count.content = f"{said}{len(self._values):,} {choice['kind']}"
         section, size = self.section, float(np.linalg.norm(np.diff(places[model.members], axis=1), axis=2).mean())
         of_members = plain_colors(len(model.members)) if colors["members"] is None else colors["members"]
+        is_faint = self.view.structure.is_moved or self.view.compare.is_over
+        self.view.legends.show("grid", "" if is_faint else legend)
         if self.view.structure.is_moved:
             of_members = np.broadcast_to(DIMMED, of_members.shape)
             self.count.content = "grey as built, while the Structure tab shows a displaced shape"
@@ -138,7 +155,10 @@ class GridTab:
             self.count.content = "grey, while Compare draws another design over it"
         ends, of_members = cut(section, places[model.members], of_members)
         lines, bodies = self.members.value and not self.tubes.value, self.members.value and self.tubes.value
-        scene.members("/grid/members", ends if lines else ends[:0], of_members if lines else of_members[:0])
+        scene.members(
+            "/grid/members", ends if lines else ends[:0], of_members if lines else of_members[:0],
+            FAINT if is_faint else LINE_WIDTH,
+        )  # fmt: skip
         scene.tubes(
             "/grid/tubes", ends if bodies else ends[:0], of_members if bodies else of_members[:0], TUBE_RADIUS * size
         )
@@ -153,7 +173,7 @@ class GridTab:
         scene.points("/grid/nodes", places[as_points], np.ascontiguousarray(of_nodes[as_points]), 0.2 * size)
         triangles, of_panels = model.triangles, colors["panels"]
         visible = np.ones(len(triangles), bool) if section is None else kept[triangles].all(axis=1)
-        visible &= self.panels.value or of_panels is not None
+        visible &= (self.panels.value or of_panels is not None) and not self.view.structure.is_moved
         scene.panels(
             "/grid/panels",
             places,
@@ -162,55 +182,25 @@ class GridTab:
             0.35 if len(model.members) <= MOST_DRAWN_LINES else None,
         )
 
-    # ---- theme and pictures
+    # ---- theme
+
+    def _light(self) -> None:
+        cloud, ground = self.view.session.cloud, 0.0
+        if cloud is not None:
+            lowest = cloud.bounds[0] + cloud.origin
+            ground = float(self.view.frame.to_scene(lowest[None])[0, 2])
+        self.view.scene.light(self.tubes.value, self.dark.value, ground)
 
     def _theme(self) -> None:
         self.view.client.gui.configure_theme(
             show_share_button=False, show_logo=False, control_width="large", dark_mode=self.dark.value
         )
-
-    def _picture(self) -> None:
-        height, width = LARGE_PICTURE
-        pixels = self._shot(height, width)
-        self._send("scantruss.png", [pixels], "PNG")
-
-    def _turntable(self) -> None:
-        if self.view.session.cloud is None:
-            raise InputError("there is no scan yet; open one")
-        camera = self.view.client.camera
-        position, target = np.array(camera.position), np.array(camera.look_at)
-        frames = []
-        for k in range(TURN_FRAMES):
-            turn = 2 * np.pi * k / TURN_FRAMES
-            around = np.array([[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 1]])
-            place = target + around @ (position - target)
-            frames.append(self._shot(*TURN_SIZE, wxyz=facing(place, target), position=tuple(place), fov=camera.fov))
-        self._send("turntable.gif", frames, "GIF")
-
-    def _shot(self, height: int, width: int, **camera: Any) -> np.ndarray:
-        """Return what the browser draws, (height, width, 3) uint8."""
-        try:
-            pixels: np.ndarray = self.view.client.get_render(height, width, timeout=PICTURE_PATIENCE, **camera)
-        except (RuntimeError, TimeoutError):
-            raise InputError("the browser gave no picture; keep the page open and in front") from None
-        return pixels
-
-    def _send(self, name: str, frames: list[np.ndarray], kind: str) -> None:
-        from PIL import Image
-
-        first, *others = [Image.fromarray(np.ascontiguousarray(each[:, :, :3])) for each in frames]
-        more = {"save_all": True, "append_images": others, "duration": TURN_MILLISECONDS, "loop": 0} if others else {}
-        stream = io.BytesIO()
-        first.save(stream, kind, **more)
-        self.view.client.send_file_download(name, stream.getvalue(), save_immediately=True)
+        if self.tubes.value:
+            self._light()
 
 
-def facing(place: np.ndarray, target: np.ndarray) -> tuple[float, float, float, float]:
-    """Return the quaternion w, x, y, z of a camera at a place that looks at a target, z being up."""
-    ahead = (target - place) / np.linalg.norm(target - place)
-    right = np.cross(ahead, [0.0, 0.0, 1.0])
-    right = right / (np.linalg.norm(right) or 1.0)
-    turn = np.stack([right, np.cross(ahead, right), ahead], axis=1)  # x right, y down, z ahead
-    w = 0.5 * np.sqrt(max(1.0 + np.trace(turn), 1e-12))
-    x, y, z = (turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1])
-    return float(w), float(x / (4 * w)), float(y / (4 * w)), float(z / (4 * w))
+def round_ends(low: float, high: float) -> tuple[float, float, float]:
+    """Return round numbers around the ends of a scale, and a round step of about a 200th of it."""
+    step = 10.0 ** np.floor(np.log10((high - low) / 100 or 0.01))
+    begin, end = np.floor(low / step), np.floor(high / step) + 1
+    return float(f"{begin * step:.12g}"), float(f"{end * step:.12g}"), float(f"{step:.12g}")

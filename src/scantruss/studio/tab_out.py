@@ -7,6 +7,8 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from ..export.formats import GRID, STRUCTURE, suffixes_of
+from ..runtime.progress import Progress
+from .further_files import FURTHER_FILES, further_files
 from .outputs import project_file, settings_files
 
 if TYPE_CHECKING:
@@ -29,6 +31,13 @@ class OutTab:
         gui.add_button("Download the project").on_click(
             self._download(lambda: project_file(session.state, session.place))
         )
+        self.further = gui.add_dropdown(
+            "further", FURTHER_FILES, hint="schedules and reports are of the structure once it is run"
+        )
+        self.size = gui.add_number(
+            "printed size", 200.0, min=1.0, step=10.0, hint="longest side of the model to print [mm]"
+        )
+        gui.add_button("Download that").on_click(view.step(self._make_further))
         gui.add_markdown("The same from the command line, with the settings beside it:")
         self.command = gui.add_markdown("")
 
@@ -36,11 +45,21 @@ class OutTab:
         return self.view.session.files(kind, self.suffix[kind].value)
 
     def _download(self, files: Callable[[], dict[str, bytes]]) -> Callable[[Any], None]:
-        def send() -> None:
-            for name, content in files().items():
-                self.view.client.send_file_download(name, content, save_immediately=True)
+        return self.view.step(lambda: self._send(files()))
 
-        return self.view.step(send)
+    def _make_further(self) -> None:
+        """Make the file in the background, for some take long."""
+        session, what, size = self.view.session, self.further.value, float(self.size.value)
+
+        def make(progress: Progress) -> None:
+            progress(what, 0.1)
+            self._send(further_files(session.state, what, size))
+
+        session.worker.ask(make)
+
+    def _send(self, files: dict[str, bytes]) -> None:
+        for name, content in files.items():
+            self.view.client.send_file_download(name, content, save_immediately=True)
 
     def fill(self, before: StudioState | None, state: StudioState) -> None:
         """Show the command lines of a state."""

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 from ..settings import UNITS
 from .clean_tool import CleanTool
-from .colours import SCAN_COLOURINGS, legend_of
+from .colours import CLASS_NAMES, MOST_CLASSES, OWN_COLORS, SCAN_COLOURINGS, colorings_of_scan
 from .crop_tool import CropTool
 from .opening import EXAMPLES
+from .remove_tool import RemoveTool
 from .tape import Tape
 
 if TYPE_CHECKING:
@@ -17,12 +18,6 @@ if TYPE_CHECKING:
     from .view import StudioView
 
 UNKNOWN_UNIT = "not known"
-CLASS_NAMES = {
-    0: "never classified", 1: "unclassified", 2: "ground", 3: "low vegetation", 4: "medium vegetation", 5: "high vegetation",
-    6: "building", 7: "low noise", 9: "water", 10: "rail", 11: "road", 13: "wire guard", 14: "wire", 15: "tower", 17: "bridge deck",
-    18: "high noise",
-}  # fmt: skip  # ASPRS, LAS 1.4 R15 table 17
-MOST_CLASSES = 24  #: with a box of their own
 
 
 class ScanTab:
@@ -31,24 +26,29 @@ class ScanTab:
     def __init__(self, view: StudioView, gui: Any) -> None:
         self.view, session, step = view, view.session, view.step
         upload = gui.add_upload_button(
-            "Open a scan or project", hint="at most 500 MB; a larger one: scantruss studio SCAN"
+            "Open a scan or project", hint="or drop a file on the page; at most 500 MB, a larger one by its path"
         )
-        self.example = gui.add_dropdown("example", tuple(EXAMPLES))
-        opened = gui.add_button("Open the example")
+        with gui.add_folder("Open a path or an example", expand_by_default=session.cloud is None):
+            self.path = gui.add_text("path", "", hint="of a file in the folder of the project")
+            by_path = gui.add_button("Open the path")
+            self.example = gui.add_dropdown("example", tuple(EXAMPLES))
+            opened = gui.add_button("Open the example")
         self.about = gui.add_markdown("")
         self.unit = gui.add_dropdown("unit", tuple(name or UNKNOWN_UNIT for name in UNITS), initial_value=UNKNOWN_UNIT)
         self.draws = gui.add_checkbox("draw scan", True)
         self.coloring = gui.add_dropdown("colour", SCAN_COLOURINGS)
-        self.legend = gui.add_html("")
         with gui.add_folder("Crop", expand_by_default=False):
             self.crop = CropTool(view, gui)
         self._classes = gui.add_folder("Classes", expand_by_default=False, visible=False)
         with gui.add_folder("Clean", expand_by_default=False):
             self.clean = CleanTool(view, gui)
+        with gui.add_folder("Remove by hand", expand_by_default=False):
+            self.remove = RemoveTool(view, gui)
         with gui.add_folder("Tape", expand_by_default=False):
             self.tape = Tape(view, gui)
         self._gui, self._boxes = gui, dict[int, Any]()
         upload.on_upload(lambda event: session.open_upload(upload.value.name, upload.value.content))
+        by_path.on_click(step(lambda: session.open_path(self.path.value)))
         opened.on_click(step(lambda: session.open_example(self.example.value)))
         self.unit.on_update(step(lambda: session.set_unit("" if self.unit.value == UNKNOWN_UNIT else self.unit.value)))
         for each in (self.draws, self.coloring):
@@ -69,7 +69,13 @@ class ScanTab:
             self.unit.value = cloud.unit or UNKNOWN_UNIT
         if before is None or before.whole is not state.whole or before.settings.classes != state.settings.classes:
             self._fill_classes(state)
-        for tool in (self.crop, self.clean, self.tape):
+        if before is None or before.whole is not state.whole:
+            known = colorings_of_scan(state)
+            kept = self.coloring.value
+            self.coloring.options = known
+            is_new = before is None or before.whole is None or before.whole.colors is None
+            self.coloring.value = known[0] if (is_new and known[0] == OWN_COLORS) or kept not in known else kept
+        for tool in (self.crop, self.clean, self.remove, self.tape):
             tool.fill(before, state)
         if before is None or before.cloud is not cloud or before.grid is not state.grid:
             if state.grid is not None and (before is None or before.grid is None):
@@ -102,7 +108,6 @@ class ScanTab:
         state = self.view.session.state
         if state.cloud is None or not self.draws.value:
             self.view.scene.remove_scan()
-            self.legend.content = ""
+            self.view.legends.show("scan", "")
             return
-        scale = self.view.scene.scan(state, self.coloring.value, self.view.look.section)
-        self.legend.content = "" if scale is None else legend_of(scale[0], state.cloud.unit, *scale[1:], False)
+        self.view.legends.show("scan", self.view.scene.scan(state, self.coloring.value, self.view.look.section))

@@ -13,6 +13,7 @@ from ..structure.supports import HELD
 from .colours import colors_of, legend_of
 from .compare import structure_figures
 from .frame import DRAWN_EXTENT
+from .scene import barbed, spread
 from .session import STRUCTURE_WORDS
 
 if TYPE_CHECKING:
@@ -22,7 +23,9 @@ if TYPE_CHECKING:
 SHOWN_DISPLACEMENT = 0.06  #: of the greatest displacement, as it is drawn first [extent of the scan]
 LOAD_ARROW = 0.08  #: of the greatest load [extent of the scan]
 SUPPORT_COLOR = np.array((20, 130, 60), np.uint8)
-LOAD_COLOR = (225, 60, 40)
+LOAD_COLOR = np.array((235, 120, 10), np.uint8)
+MOST_ARROWS = 160  #: of loads, spread over the structure
+ARROW_WIDTH = 2.0  #: of a load [pixel]
 SUPPORT_RADIUS = 0.09  #: of a support that is drawn [scene]
 ANIMATION_SECONDS, FRAME_SECONDS = 6.0, 0.08  #: of a mode that is shown [s]
 SWINGS = 3  #: of a mode while it is shown
@@ -51,6 +54,11 @@ def weight_bars(weights: dict[int, float]) -> str:
         f'<table style="font-size:.85em;width:100%;padding:0 .6em"><caption style="text-align:left">mass by the most different'
         f" sections</caption>{rows}</table>"
     )
+
+
+def times_of(factor: float) -> str:
+    """Return a factor with three digits, written out."""
+    return f"{float(f'{factor:.3g}'):,.0f}" if factor >= 100 else f"{factor:.3g}"
 
 
 class StructureTab:
@@ -83,7 +91,6 @@ class StructureTab:
         self.factor = gui.add_text(
             "enlarged", "", hint="how many times displacements are drawn; empty: so that they are seen"
         )
-        self.legend = gui.add_html("")
         self.loads, self.supports = gui.add_checkbox("loads", True), gui.add_checkbox("supports", True)
         animate = gui.add_button("Animate")
         run.on_click(view.step(self._run))
@@ -185,10 +192,10 @@ class StructureTab:
         return moved, factor, is_mode
 
     def _draw(self, state: StudioState) -> None:
-        scene, shown = self.view.scene, self.view.shown_model()
-        self.legend.content = ""
+        scene, shown, legend = self.view.scene, self.view.shown_model(), ""
         if shown is None or state.solution is None or shown[0].truss is None:
             scene.remove("/moved", "/loads", "/supports/held")
+            self.view.legends.show("shape", "")
             return
         model, _ = shown
         places = self.view.places(model)
@@ -203,7 +210,8 @@ class StructureTab:
             colors, low, high = colors_of(size, None)
             scene.lines("/moved", (places + self._in_scene(change, factor))[model.members], colors, 4.0)
             if not is_mode:
-                self.legend.content = legend_of(f"displacement, drawn {factor:.3g} times", "mm", low, high, False)
+                legend = legend_of(f"displacement, drawn {times_of(factor)} times", "mm", low, high, False)
+        self.view.legends.show("shape", legend)
         self._draw_loads(state, places)
 
     def _in_scene(self, change: np.ndarray, factor: float) -> np.ndarray:
@@ -224,9 +232,10 @@ class StructureTab:
             for side in (0, 1):
                 np.add.at(forces, truss.members[:, side], half)
         size = np.linalg.norm(forces, axis=1)
-        strong = size > 0.02 * size.max() if size.max() > 0 else size > 0
-        along = forces[strong] * (LOAD_ARROW * DRAWN_EXTENT / (size.max() or 1.0))
-        self.view.scene.arrows("/loads", places[strong], along, LOAD_COLOR)
+        strong = np.flatnonzero(size > 0.02 * size.max())
+        drawn = strong[spread(places[strong], MOST_ARROWS)]
+        along = forces[drawn] * (LOAD_ARROW * DRAWN_EXTENT / (size.max() or 1.0))
+        self.view.scene.lines("/loads", barbed(places[drawn], along), LOAD_COLOR, ARROW_WIDTH)
 
     def _animate(self) -> None:
         state, shown = self.view.session.state, self.view.shown_model()

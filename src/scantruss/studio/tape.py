@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError
+from .frame import SceneFrame
 from .picking import nearest_point, place_on_scan
 
 if TYPE_CHECKING:
@@ -30,30 +31,25 @@ class Tape:
 
     def _start(self) -> None:
         self._begin = None
-        self.view.scene.remove("/tape", "/tape end", "/tape length")
-        self.view.click.value, self.said.visible = TAPE_MODE, True
-        self.said.content = "click two points"
+        self.view.scene.remove("/tape end")
+        self.view.click.value = TAPE_MODE
+        self.view.session.measure(())
+        self._say("click two points")
+
+    def _say(self, words: str) -> None:
+        self.said.visible, self.said.content = bool(words), words
 
     def _clicked(self, origin: np.ndarray, ahead: np.ndarray) -> None:
         """Take the node or the point of the scan under a click."""
         at = self._place(origin, ahead)
         if at is None:
             raise InputError("nothing to measure is there; click on a point of the scan or a node of the grid")
-        scene = self.view.scene
         if self._begin is None:
             self._begin = at
-            scene.remove("/tape", "/tape length")
-            scene.points("/tape end", at[None].astype(np.float32), np.array(TAPE_COLOR, np.uint8), 0.12)
+            self.view.scene.points("/tape end", at[None].astype(np.float32), np.array(TAPE_COLOR, np.uint8), 0.12)
             return
-        ends, self._begin = np.stack([self._begin, at]), None
-        way = np.diff(self.view.frame.from_scene(ends), axis=0)[0]
-        cloud = self.view.session.cloud
-        unit = f" {cloud.unit}" if cloud is not None and cloud.unit else ""
-        length = f"{np.linalg.norm(way):.4g}{unit}"
-        scene.lines("/tape", ends[None], np.array(TAPE_COLOR, np.uint8), 5.0)
-        scene.api.add_label("/tape length", length, position=tuple(ends.mean(axis=0).tolist()))
-        across = ", ".join(f"{name} {part:.4g}" for name, part in zip("xyz", way.tolist(), strict=True))
-        self.said.visible, self.said.content = True, f"**{length}** ({across}; in plan {np.linalg.norm(way[:2]):.4g})"
+        ends, self._begin = self.view.frame.from_scene(np.stack([self._begin, at])), None
+        self.view.session.measure(tuple(tuple(float(f"{c:.9g}") for c in end) for end in ends.tolist()))
 
     def _place(self, origin: np.ndarray, ahead: np.ndarray) -> np.ndarray | None:
         """Return the place in the scene: of a node, rather than of a point of the scan."""
@@ -67,7 +63,20 @@ class Tape:
         return place_on_scan(self.view.frame.to_scene(cloud.points + cloud.origin), origin, ahead)
 
     def fill(self, before: StudioState | None, state: StudioState) -> None:
-        """Put the tape away where the scan is another one."""
-        if before is not None and before.cloud is not state.cloud:
-            self._begin, self.said.content = None, ""
-            self.view.scene.remove("/tape", "/tape end", "/tape length")
+        """Show the tape of a state."""
+        if before is not None and before.tape == state.tape and before.cloud is state.cloud:
+            return
+        self._begin = None
+        scene = self.view.scene
+        scene.remove("/tape", "/tape end", "/tape length")
+        if state.cloud is None or not state.tape:
+            self._say("")
+            return
+        ends = np.array(state.tape, float)
+        places, way = SceneFrame.of(state.cloud).to_scene(ends), ends[1] - ends[0]
+        unit = f" {state.cloud.unit}" if state.cloud.unit else ""
+        length = f"{np.linalg.norm(way):.4g}{unit}"
+        scene.lines("/tape", places[None], np.array(TAPE_COLOR, np.uint8), 5.0)
+        scene.api.add_label("/tape length", length, position=tuple(places.mean(axis=0).tolist()))
+        across = ", ".join(f"{name} {part:.4g}" for name, part in zip("xyz", way.tolist(), strict=True))
+        self._say(f"**{length}** ({across}; in plan {np.linalg.norm(way[:2]):.4g})")

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
 from collections.abc import Callable
-from threading import RLock
+from threading import RLock, Timer
 from typing import Any
 
 import numpy as np
@@ -14,11 +15,12 @@ from ..export.formats import GRID, STRUCTURE
 from ..export.model import Model
 from ..export.page_tables import Tables, tables_of
 from ..structure.build import scale_of
-from .colours import SCAN_COLOURINGS
+from .colours import colorings_of_scan
 from .frame import BESIDE_FIRST, DRAWN_EXTENT, SceneFrame
+from .legends import Legends
 from .outputs import model_to_show
 from .picking import NEAR_ENOUGH, pick
-from .scene import Scene
+from .scene import FIRST_POINTS, Scene
 from .session import Session
 from .state import StudioState
 from .style import PANEL_STYLE
@@ -37,8 +39,14 @@ SELECT = "select"
 NATURAL_VIEW = 0.65  #: of the camera, upright [rad]
 PLAN_VIEW = 0.08  #: the same of a plan, seen from so far that heights hardly matter [rad]
 PLAN_FAR = 1.3  #: of the camera above a plan, so that all of it is seen [distance at which it fills the view]
-PANEL_WIDTH = 452  #: [pixel]
-STEP_NAMES = ("Generate", "Stop", "Undo", "Redo")
+PANEL_WIDTH, USUAL_WIDTH = 452, 1280  #: of the panel; of a page that has not said its own [pixel]
+WIDE_ENOUGH = 1.15  #: width over height of a drawing whose width does not limit what is seen
+STEP_NAMES = ("Stop", "Undo", "Redo")
+SMALL_PICTURE, PICTURE_WAIT = (
+    (8, 8),
+    2.0,
+)  #: size of a picture that is asked for first [pixel], and how long it may take [s]
+TYPING_PAUSE = 0.6  #: after which what was typed counts [s]
 
 
 class StudioView:
@@ -47,13 +55,16 @@ class StudioView:
     def __init__(self, session: Session, client: Any) -> None:
         self.session, self.client = session, client
         self.scene = Scene(client.scene)
+        whole = float(client.camera.image_width or USUAL_WIDTH)
+        self._width = max(whole - PANEL_WIDTH, 0.5 * whole)  # of the drawing once the panel is beside it [pixel]
         self._lock = RLock()
         self._shown: StudioState | None = None
         self._model: tuple[StudioState, Model, Tables] | None = None
-        if session.cloud is not None and session.grid is None:  # seen while the controls are still being made
-            self.scene.scan(session.state, SCAN_COLOURINGS[0], None)
+        if session.cloud is not None:  # seen while the controls are still being made
+            self.scene.scan(session.state, colorings_of_scan(session.state)[0], None, FIRST_POINTS)
             self.overview()
             client.flush()
+            self._wait_for_picture()
         self.modes: dict[str, Click] = {SELECT: self._select_under}  #: what a click in the scene can do
         gui = client.gui
         with client.atomic():
@@ -63,13 +74,13 @@ class StudioView:
             gui.add_html(PANEL_STYLE)
             self.message = gui.add_markdown("")
             self.progress = gui.add_progress_bar(0.0, visible=False)
+            generate = gui.add_button("Generate", color="blue", hint="with the effort that Design says (Ctrl+Enter)")
             self.steps = gui.add_button_group(
-                "steps",
-                STEP_NAMES,
-                hint="Generate with the effort that Design says; what undo and redo would take is said above",
+                "steps", STEP_NAMES, hint="what undo (Ctrl+Z) and redo (Ctrl+Y) would take is said above"
             )
             self.click = gui.add_dropdown("a click", (SELECT,), hint="what a click on the drawing does")
             self.row = gui.add_markdown("", visible=False)
+            self.legends = Legends(gui)
             tabs = gui.add_tab_group()
             with tabs.add_tab("Scan"):
                 self.scan = ScanTab(self, gui)
@@ -86,11 +97,18 @@ class StudioView:
             with tabs.add_tab("Out"):
                 self.files = OutTab(self, gui)
             self.click.options = self.clicks
-            self.steps.on_click(self.step(lambda: self._step(self.steps.value)))  # before anybody can click
+            generate.on_click(self.step(session.generate))  # before anybody can click
+            self.steps.on_click(self.step(lambda: self._step(self.steps.value)))
+            self._add_keys(gui)
         self.tabs = (self.design, self.constraints, self.structure, self.look, self.scan, self.compare, self.files)
         client.scene.on_click()(self._clicked)
         self._end = session.listen(self.update)
         self.update()
+
+    def _wait_for_picture(self) -> None:
+        """Let the page draw what it has, before it is kept busy with a hundred controls."""
+        with contextlib.suppress(RuntimeError, TimeoutError):
+            self.client.get_render(*SMALL_PICTURE, timeout=PICTURE_WAIT)
 
     def close(self) -> None:
         """Stop listening to the session."""
@@ -119,6 +137,21 @@ class StudioView:
             self.session.message = "" if not self.session.stage else self.session.message
         self.update()
 
+    def typed(self, step: Callable[[], None]) -> Callable[[Any], None]:
+        """Return what a text field calls: the step is taken when no more is typed."""
+        waiting: list[Timer] = []
+
+        def call(event: Any) -> None:
+            if getattr(event, "client", self.client) is None:
+                return
+            while waiting:  # ends: each turn takes one away
+                waiting.pop().cancel()
+            waiting.append(Timer(TYPING_PAUSE, self.do, (step,)))
+            waiting[0].daemon = True
+            waiting[0].start()
+
+        return call
+
     def do_quietly(self, step: Callable[[], None]) -> None:
         """Take a step of which there are many a second; what is refused is said on the page."""
         try:
@@ -133,7 +166,17 @@ class StudioView:
 
     def _step(self, name: str) -> None:
         session = self.session
-        dict(zip(STEP_NAMES, (session.generate, session.stop, session.undo, session.redo), strict=True))[name]()
+        dict(zip(STEP_NAMES, (session.stop, session.undo, session.redo), strict=True))[name]()
+
+    def _add_keys(self, gui: Any) -> None:
+        """Let keys take steps too."""
+        session = self.session
+        for words, key, step in (
+            ("Undo", "Z", session.undo),
+            ("Redo", "Y", session.redo),
+            ("Generate", "enter", session.generate),
+        ):
+            gui.add_command(words, hotkey=key, modifier="cmd/ctrl").on_trigger(self.step(step))
 
     # ---- clicks
 
@@ -141,6 +184,10 @@ class StudioView:
     def clicks(self) -> tuple[str, ...]:
         """What a click can do."""
         return tuple(self.modes)
+
+    def when_mode_changes(self, tell: Callable[[], None]) -> None:
+        """Call `tell` whenever a click means something else."""
+        self.click.on_update(lambda _: self.do_quietly(tell))
 
     @property
     def near(self) -> float:
@@ -232,11 +279,18 @@ class StudioView:
             self.client.camera.position = (0.0, -1e-3 * high, high)
             self.client.camera.look_at = (0.0, 0.0, 0.0)
 
+    @property
+    def _aspect(self) -> float:
+        """Width over height of the drawing, the panel beside it."""
+        camera = self.client.camera
+        return max(min(float(camera.image_width), self._width) / max(float(camera.image_height), 1.0), 0.3)
+
     def overview(self, designs: int = 1) -> None:
         """Move the camera so that all of the scan is seen, or of several designs side by side."""
         middle = np.array([0.5 * BESIDE_FIRST * DRAWN_EXTENT * (designs - 1), 0.0, 0.0])
+        far = DRAWN_EXTENT * (0.3 + 0.7 * designs) * max(1.0, WIDE_ENOUGH / self._aspect)
         self.client.camera.fov = NATURAL_VIEW
-        self.client.camera.position = tuple(middle + DRAWN_EXTENT * (0.3 + 0.7 * designs) * np.array([0.8, -1.4, 0.9]))
+        self.client.camera.position = tuple(middle + far * np.array([0.8, -1.4, 0.9]))
         self.client.camera.look_at = tuple(middle)
 
     def update(self) -> None:

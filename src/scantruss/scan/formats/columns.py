@@ -28,6 +28,10 @@ COLUMN_NAMES = {
     "nx": ("nx", "normalx", "scalarnx", "xnormal"),
     "ny": ("ny", "normaly", "scalarny", "ynormal"),
     "nz": ("nz", "normalz", "scalarnz", "znormal"),
+    "red": ("red", "r", "colorred", "diffusered", "scalarred"),
+    "green": ("green", "g", "colorgreen", "diffusegreen", "scalargreen"),
+    "blue": ("blue", "b", "colorblue", "diffuseblue", "scalarblue"),
+    "rgb": ("rgb", "rgba"),
 }
 NORMAL_COLUMNS = ("nx", "ny", "nz")  # attributes that are a normal together
 

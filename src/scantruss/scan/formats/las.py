@@ -23,7 +23,10 @@ from .las_header import check_header
 from .systems import system_of
 
 POINTS_PER_CHUNK = 1_000_000  # points
-FIELD_OF_ATTRIBUTE = {"class": "classification", "return_number": "return_number", "return_count": "number_of_returns"}
+FIELD_OF_ATTRIBUTE = {
+    "class": "classification", "return_number": "return_number", "return_count": "number_of_returns",
+    "red": "red", "green": "green", "blue": "blue",
+}  # fmt: skip
 LOST_OF_SPACING = 1e-3  # rounding of a coordinate, as a share of the spacing
 LARGEST_INT32 = float(2**31 - 2)  # a coordinate is a whole number of 32 bits
 UNIT_CODES = {"m": 9001, "foot": 9002}  # EPSG
@@ -46,14 +49,15 @@ def read_las(path: Path, wanted: Sequence[str] = (), places_of: Places | None = 
     points = np.concatenate([np.empty((0, 3)), *(chunk.points for chunk in chunks)])
     check_count(path, promised, len(points) + withheld + unread)
     none = np.empty(0, dtype=np.uint8)
-    attributes = {name: np.concatenate([none, *(chunk.attributes[name] for chunk in chunks)]) for name in names}
+    held = [name for name in names if all(name in chunk.attributes for chunk in chunks)]
+    attributes = {name: np.concatenate([none, *(chunk.attributes[name] for chunk in chunks)]) for name in held}
     feet = look_like_feet(points, attributes["return_count"]) if said.z_metres is None else ""
     left_out = {WITHHELD: withheld} if withheld else {}
     return replace(said, points=points, attributes=attributes, left_out=left_out, feet=feet, notes=notes)
 
 
 def fields_of(wanted: Sequence[str]) -> list[str]:
-    """Return the wanted attributes that the format has, each once."""
+    """Return the wanted attributes that the format may have, each once."""
     return [name for name in dict.fromkeys(wanted) if name in FIELD_OF_ATTRIBUTE]
 
 
@@ -63,7 +67,10 @@ def content_of_records(record: Any, names: Sequence[str]) -> Content:
     for axis, name in enumerate("XYZ"):
         np.multiply(record[name], record.scales[axis], out=points[:, axis])
         points[:, axis] += record.offsets[axis]
-    attributes = {name: np.array(record[FIELD_OF_ATTRIBUTE[name]]) for name in names}
+    held = set(record.point_format.dimension_names)
+    attributes = {
+        name: np.array(record[FIELD_OF_ATTRIBUTE[name]]) for name in names if FIELD_OF_ATTRIBUTE[name] in held
+    }
     kept = np.array(record["withheld"]) == 0
     if kept.all():
         return Content(points, attributes)
@@ -93,7 +100,9 @@ def fields_for(names: Sequence[str]) -> Any:
     from laspy import DecompressionSelection as Fields
 
     fields = Fields.base() | Fields.Z | Fields.FLAGS
-    return fields | Fields.CLASSIFICATION if "class" in names else fields
+    for name, more in (("class", Fields.CLASSIFICATION), ("red", Fields.RGB)):
+        fields |= more if name in names else fields
+    return fields
 
 
 def records_near(

@@ -11,7 +11,9 @@ import numpy as np
 from ...errors import FormatError
 from .content import Content
 from .kinds import is_text, kind_of, read_head, wrong_kind
+from .own_colors import COLOR_ATTRIBUTES
 
+WIDTH_WITH_COLORS = 7  #: numbers of a point with intensity and colour
 HEAD_LINES = (1, 1, 3, 3, 3, 3, 4, 4, 4, 4)  #: numbers in the lines of a head: columns, rows, scanner, its axes, matrix
 
 
@@ -20,7 +22,8 @@ def read_ptx(path: Path, wanted: Sequence[str] = ()) -> Content:
     head = read_head(path)
     if kind_of(head) or not is_text(head):
         raise wrong_kind(path, head, "a PTX file")
-    parts, missing = list[np.ndarray](), 0
+    parts, colors, missing = list[np.ndarray](), list[np.ndarray](), 0
+    wants_colors = set(COLOR_ATTRIBUTES) <= set(wanted)
     with path.open(encoding="latin-1") as file:
         while lines := list(
             islice((line for line in file if not line.isspace()), len(HEAD_LINES))
@@ -42,9 +45,15 @@ def read_ptx(path: Path, wanted: Sequence[str] = ()) -> Content:
             missing += count - int(returned.sum())
             matrix = np.array(numbers[6:])
             parts.append(points[returned] @ matrix[:3, :3] + matrix[3, :3])
+            if wants_colors and rows and len(rows[0].split()) == WIDTH_WITH_COLORS:
+                colors.append(np.loadtxt(rows, usecols=(4, 5, 6), ndmin=2)[returned])
     if not parts:
         raise FormatError(f"{path} holds no scan; a PTX file begins with its columns and rows")
-    return Content(np.concatenate(parts), metres=1.0, left_out={"without a return": missing} if missing else {})
+    left_out = {"without a return": missing} if missing else {}
+    attributes: dict[str, np.ndarray] = {}
+    if len(colors) == len(parts):
+        attributes = dict(zip(COLOR_ATTRIBUTES, np.concatenate(colors).T, strict=True))
+    return Content(np.concatenate(parts), attributes, metres=1.0, left_out=left_out)
 
 
 def _numbers(path: Path, lines: list[str], scan: int) -> list[list[float]]:

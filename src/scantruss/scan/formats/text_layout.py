@@ -14,9 +14,11 @@ from ...errors import FormatError
 from ..units import metres_of_columns, metres_of_comments
 from .columns import check_not_degrees, find_attributes, fit_columns
 from .kinds import is_text, kind_of, read_head, wrong_kind
+from .own_colors import COLOR_ATTRIBUTES
 from .text_fields import ANY_SEPARATOR, NUMBER_COMMA, count_numbers, header_names, is_number, split_line
 
 BYTES_EXAMINED = 1 << 16  # bytes examined at the start and in the middle
+WIDTH_OF_PTS = 7  # x y z intensity red green blue, as scanners write it without names
 LINES_EXAMINED = 1000  # lines examined in each part
 BOM = b"\xef\xbb\xbf"  # how UTF-8 may start
 LINE_BREAK = re.compile(r"\r\n|\n|\r")
@@ -105,6 +107,8 @@ def _with_header(path: Path, layout: Layout, header: Sequence[str], wanted: Sequ
         by_name = metres_of_columns(path, [names[column] for column in layout.columns])
         metres, z_metres = by_name if by_name[0] else (metres, z_metres)
     attributes = tuple(max(found, key=len, default={}).items())
+    if not attributes and path.suffix.lower() == ".pts" and layout.width == WIDTH_OF_PTS:
+        attributes = tuple((name, 4 + k) for k, name in enumerate(COLOR_ATTRIBUTES) if name in wanted)
     stripped = tuple(line.strip() for line in header)
     return replace(layout, attributes=attributes, metres=metres, z_metres=z_metres, header=stripped)
 

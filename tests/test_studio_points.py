@@ -1,0 +1,254 @@
+"""Points in the studio: their own colours and classes, those removed by hand, the tape, and where projects are saved."""
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from e57_file import Column
+from scan_files import axes, e57, pcd
+
+import scantruss as st
+from scantruss.scan.formats.own_colors import own_colors
+from scantruss.scan.formats.reading import read_points
+from scantruss.studio.browsers import Browsers
+from scantruss.studio.colours import CLASSES, OWN_COLORS, colorings_of_scan, colors_of, colors_of_scan, rgb_of
+from scantruss.studio.outputs import TAKEN, command_of, settings_files
+from scantruss.studio.pictures import facing, over
+from scantruss.studio.project import save_project
+from scantruss.studio.remove_tool import seen_within
+from scantruss.studio.scene import BARB_WIDTH, barbed, spread
+from scantruss.studio.session import Session
+from scantruss.studio.tab_grid import round_ends
+
+RNG = np.random.default_rng(7)
+X, Y = (each.ravel() for each in np.meshgrid(np.linspace(0, 9, 40), np.linspace(0, 7, 30)))
+P = np.stack([X, Y, 0.2 * np.sin(X)], axis=1)
+COLORS = RNG.integers(0, 256, (len(P), 3)).astype(np.uint8)
+COLORS[0] = 255
+
+
+def written_in_color(folder: Path, suffix: str) -> Path:
+    """Write the points and their colours in a format, with numbers as its programs write them."""
+    path = folder / f"roof{suffix}"
+    red, green, blue = COLORS.T.astype(int)
+    if suffix == ".las":
+        laspy = pytest.importorskip("laspy")
+        file = laspy.LasData(laspy.LasHeader(point_format=2, version="1.2"))
+        file.header.scales = np.full(3, 1e-4)
+        file.x, file.y, file.z = P.T
+        file.red, file.green, file.blue = (257 * each for each in (red, green, blue))
+        file.classification = (X > 4).astype(np.uint8)
+        file.write(path)
+    elif suffix == ".e57":
+        more = [Column(f"color{name}", each, "integer", low=0, high=255)
+                for name, each in zip(("Red", "Green", "Blue"), (red, green, blue), strict=True)]  # fmt: skip
+        path.write_bytes(e57(([*axes(P), *more], "")))
+    elif suffix == ".pcd":
+        packed = (red << 16 | green << 8 | blue).astype(np.uint32).view(np.float32)
+        places = [(name, "f8", P[:, k]) for k, name in enumerate("xyz")]
+        path.write_bytes(pcd([*places, ("rgb", "f4", packed)], "binary"))
+    elif suffix == ".ply":
+        head = "".join(f"property float {axis}\n" for axis in "xyz")
+        head += "".join(f"property uchar {name}\n" for name in ("red", "green", "blue"))
+        rows = "\n".join(f"{x:.9g} {y:.9g} {z:.9g} {r} {g} {b}" for (x, y, z), (r, g, b) in zip(P, COLORS, strict=True))
+        path.write_text(f"ply\nformat ascii 1.0\nelement vertex {len(P)}\n{head}end_header\n{rows}\n")
+    else:
+        share = COLORS / 255.0 if suffix == ".csv" else COLORS
+        table = np.column_stack([P, *([np.zeros(len(P))] if suffix == ".pts" else []), share])
+        np.savetxt(path, table, "%.9g", "," if suffix == ".csv" else " ",
+                   header="x,y,z,R,G,B" if suffix == ".csv" else str(len(P)), comments="")  # fmt: skip
+    return path
+
+
+def opened(path: Path, project: Path | None = None) -> Session:
+    """Open a scan, without a quick grid after each step: it is not looked at."""
+    session = Session(project, folder=path.parent)
+    session.open(path)
+    session.show_quick = lambda: False  # type: ignore[method-assign]
+    return session
+
+
+@pytest.mark.parametrize("suffix", [".las", ".ply", ".pcd", ".e57", ".csv", ".pts"])
+def test_a_scan_has_its_own_colours(suffix: str, tmp_path: Path) -> None:
+    session = opened(written_in_color(tmp_path, suffix))
+    assert colorings_of_scan(session.state)[0] == OWN_COLORS
+    found, legend = colors_of_scan(session.state, np.arange(len(P)), OWN_COLORS)
+    assert np.array_equal(found, COLORS) and legend == ""
+    session.crop(("box:2,1,7,6",))
+    kept = (X >= 2) & (X <= 7) & (Y >= 1) & (Y <= 6)
+    assert session.cloud is not None and len(session.cloud.points) == kept.sum()
+    assert np.array_equal(colors_of_scan(session.state, np.arange(kept.sum()), OWN_COLORS)[0], COLORS[kept])
+
+
+def test_a_scan_without_colours_has_none(tmp_path: Path) -> None:
+    np.savetxt(tmp_path / "a.xyz", P)
+    assert OWN_COLORS not in colorings_of_scan(opened(tmp_path / "a.xyz").state)
+    assert own_colors({}) is None
+    assert own_colors(dict.fromkeys(("red", "green", "blue"), np.zeros(9))) is None  # nobody has measured black alone
+
+
+def test_classes_are_coloured_and_named(tmp_path: Path) -> None:
+    session = opened(written_in_color(tmp_path, ".las"))
+    colors, legend = colors_of_scan(session.state, np.arange(len(P)), CLASSES)
+    assert len(np.unique(colors, axis=0)) == 2 and "1 unclassified" in legend
+    assert len(np.unique(colors[X > 4.01], axis=0)) == 1
+
+
+def test_points_removed_by_hand_stay_away_and_come_back(tmp_path: Path) -> None:
+    place = tmp_path / "roof.scantruss"
+    session = opened(written_in_color(tmp_path, ".ply"), place)
+    with pytest.raises(st.InputError, match="no points are marked"):
+        session.remove_points(np.zeros(len(P), np.bool_))
+    session.remove_points(X < 2)
+    session.crop(("box:0,0,9,5",))
+    cloud = session.cloud
+    assert cloud is not None
+    session.remove_points(cloud.points[:, 0] + cloud.origin[0] > 8)
+    kept = (X >= 2) & (X <= 8) & (Y <= 5)
+    assert np.array_equal(session.state.taken(), kept)
+    again = Session()
+    again.open(place)
+    assert again.cloud is not None and session.cloud is not None
+    assert np.array_equal(again.cloud.points, session.cloud.points) and np.array_equal(again.state.taken(), kept)
+    assert np.array_equal(colors_of_scan(again.state, np.arange(kept.sum()), OWN_COLORS)[0], COLORS[kept])
+    (tmp_path / TAKEN).write_bytes(settings_files(session.state)[TAKEN])
+    assert f"grid {TAKEN}" in command_of(session.state)  # no option removes them: the points go along
+    read = read_points(tmp_path / TAKEN)
+    assert np.array_equal(read.points, session.cloud.points) and np.array_equal(read.origin, session.cloud.origin)
+    session.undo()
+    assert session.state.taken().sum() == ((X >= 2) & (Y <= 5)).sum()
+    session.restore_points()
+    assert session.state.taken().sum() == (Y <= 5).sum()
+
+
+def test_a_rectangle_holds_what_the_camera_sees_in_it() -> None:
+    position, target, fov, aspect = np.array([6.0, -9.0, 7.0]), np.zeros(3), 0.7, 1.6
+    camera = SimpleNamespace(wxyz=facing(position, target), position=position, fov=fov, aspect=aspect)
+    places = RNG.uniform(-4, 4, (500, 3))
+    ends = np.array([[0.3, 0.25], [0.8, 0.6]])
+    ahead = (target - position) / np.linalg.norm(target - position)
+    right = np.cross(ahead, [0, 0, 1]) / np.linalg.norm(np.cross(ahead, [0, 0, 1]))
+    down = np.cross(ahead, right)
+    for place, is_inside in zip(places, seen_within(places, camera, ends), strict=True):  # the pinhole, written out
+        depth = (place - position) @ ahead
+        x = 0.5 + (place - position) @ right / depth / (2 * np.tan(fov / 2) * aspect)
+        y = 0.5 + (place - position) @ down / depth / (2 * np.tan(fov / 2))
+        assert is_inside == (0.3 <= x <= 0.8 and 0.25 <= y <= 0.6)
+
+
+def test_the_tape_is_a_step_and_part_of_the_project(tmp_path: Path) -> None:
+    np.savetxt(tmp_path / "a.xyz", P)
+    session = opened(tmp_path / "a.xyz", tmp_path / "a.scantruss")
+    ends = ((0.0, 0.0, 0.0), (3.0, 4.0, 0.0))
+    session.measure(ends)
+    again = Session()
+    again.open(tmp_path / "a.scantruss")
+    assert again.state.tape == ends
+    session.measure(())
+    counts = []
+    for _ in range(2):
+        session.undo()
+        counts.append(len(session.state.tape))
+    assert counts == [2, 0] and session.history.words[1] == "tape"
+
+
+def test_each_scan_that_is_opened_has_a_project_of_its_own(tmp_path: Path) -> None:
+    for name in "ab":
+        np.savetxt(tmp_path / f"{name}.xyz", P + (name == "b"))
+    session = opened(tmp_path / "a.xyz", tmp_path / "a.scantruss")
+    session.set_unit("m")
+    first = (tmp_path / "a.scantruss").read_bytes()
+    session.open_path("b.xyz")
+    assert session.worker.wait(120) and session.place == tmp_path / "b.scantruss" and session.place.exists()
+    assert (tmp_path / "a.scantruss").read_bytes() == first
+    session.undo()
+    assert session.place == tmp_path / "a.scantruss" and session.settings.unit == "m"
+    session.open_path("a.scantruss")
+    assert session.worker.wait(120) and session.place == tmp_path / "a.scantruss" and session.settings.unit == "m"
+
+
+def test_a_project_that_another_browser_has_open_is_opened_as_a_copy(tmp_path: Path) -> None:
+    np.savetxt(tmp_path / "a.xyz", P)
+    browsers = Browsers(opened(tmp_path / "a.xyz", tmp_path / "a.scantruss"))
+    (_, first), (_, second) = browsers.join(None), browsers.join(None)
+    first.set_unit("m")
+    second.open_path("a.scantruss")
+    assert second.worker.wait(120) and second.settings.unit == "m"
+    assert first.place == tmp_path / "a.scantruss" and second.place not in (None, first.place)
+    browsers.stop()
+
+
+@pytest.mark.parametrize("name", ["../out.xyz", "/etc/passwd", "none.xyz", "inner/../../out.xyz", ""])
+def test_a_path_of_another_folder_is_refused(name: str, tmp_path: Path) -> None:
+    home = tmp_path / "home"
+    home.mkdir()
+    np.savetxt(tmp_path / "out.xyz", P)
+    np.savetxt(home / "a.xyz", P)
+    session = opened(home / "a.xyz")
+    with pytest.raises(st.InputError):
+        session.open_path(name)
+    (home / "link.xyz").symlink_to(tmp_path / "out.xyz")
+    with pytest.raises(st.InputError, match="only files within"):
+        session.open_path("link.xyz")
+
+
+def test_a_project_whose_cleaning_named_the_taken_points_still_opens(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As projects of format 3 did."""
+    far = np.concatenate([P, [[4.0, 3.0, 9.0]]])
+    np.savetxt(tmp_path / "a.xyz", far)
+    session = opened(tmp_path / "a.xyz")
+    session.crop(("box:2,0,9,7",))
+    session.propose_cleaning(3.0, 0.005)
+    assert session.worker.wait(120)
+    session.clean()
+    taken, cleaning = session.state.taken(), session.state.cleaning
+    assert cleaning is not None and not taken[-1] and cleaning.removes.sum() == 1
+    chosen = far[:, 0] >= 2
+    monkeypatch.setattr("scantruss.studio.project.PROJECT_VERSION", 3)
+    object.__setattr__(cleaning, "removes", cleaning.removes[chosen])
+    save_project(tmp_path / "old.scantruss", session.state)
+    again = Session()
+    again.open(tmp_path / "old.scantruss")
+    assert np.array_equal(again.state.taken(), taken)
+
+
+def test_what_is_drawn_of_loads() -> None:
+    places, along = RNG.uniform(-5, 5, (40, 3)), RNG.normal(size=(40, 3))
+    segments = barbed(places, along).reshape(40, 5, 2, 3)
+    assert np.allclose(segments[:, :, 1], places[:, None])  # all end at the tip
+    assert np.allclose(segments[:, 0, 0], places - along)
+    back = places[:, None] - segments[:, 1:, 0]
+    ahead = along / np.linalg.norm(along, axis=1)[:, None]
+    off = np.linalg.norm(back - (back @ ahead[:, :, None]) * ahead[:, None], axis=2)
+    assert np.allclose(off, BARB_WIDTH)
+    taken = spread(places, 10)
+    gaps = np.linalg.norm(places[taken][:, None] - places[taken], axis=2) + 99 * np.eye(10)
+    rest = np.linalg.norm(places[:, None] - places[taken], axis=2).min(axis=1)
+    assert len(set(taken.tolist())) == 10 and gaps.min() >= rest.max()  # farthest first: none is left farther off
+    assert np.array_equal(spread(places[:3], 10), [0, 1, 2])
+
+
+def test_a_picture_lies_over_its_background() -> None:
+    pixels = np.zeros((2, 3, 4), np.uint8)
+    pixels[0, 0] = (10, 20, 30, 255)
+    pixels[1, 1] = (200, 0, 0, 127)
+    seen = over(pixels, np.array((255, 255, 255), np.uint8))
+    assert tuple(seen[0, 0]) == (10, 20, 30) and tuple(seen[0, 1]) == (255, 255, 255)
+    assert 225 < seen[1, 1, 0] < 230 and 126 < seen[1, 1, 1] < 130
+
+
+@pytest.mark.parametrize(("low", "high"), [(0.7685, 1.255), (0.000917, 0.04773), (-17.85, 1.556), (6, 6), (3, 7)])
+def test_the_ends_of_a_slider_are_round(low: float, high: float) -> None:
+    begin, end, step = round_ends(low, high)
+    assert begin <= low and high <= end <= high + 1.01 * step and len(f"{end:g}") <= 7
+    assert low == high or 90 < (high - low) / step < 1010
+
+
+def test_a_scale_with_given_ends_and_colours_beyond_it() -> None:
+    values = np.array([0.2, 0.7, 1.0, 4.0])
+    colors, low, high = colors_of(values, None, (0.2, 1.0))
+    assert (low, high) == (0.2, 1.0) and np.array_equal(colors[2], colors[3])
+    assert rgb_of("#d81e2c") == (216, 30, 44)
