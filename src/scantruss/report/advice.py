@@ -29,12 +29,12 @@ if TYPE_CHECKING:
 A_FEW, SOME_MORE = 3, 8  # grids that are made of a length before others are tried, and when it is tried again
 #: lengths to try in turn after the usual one, as multiples of it, with how many grids are made of each
 LONGER_FIRST = (
-    (1.4, A_FEW), (2.0, A_FEW), (1.0, SOME_MORE), (1 / 1.4, A_FEW), (1.4, SOME_MORE), (2.8, A_FEW), (2.0, SOME_MORE),
-    (0.5, A_FEW), (2.8, SOME_MORE),
+    (1.4, A_FEW), (2.0, A_FEW), (2.8, A_FEW), (1 / 1.4, A_FEW), (2.0, SOME_MORE), (1.4, SOME_MORE), (1.0, SOME_MORE),
+    (2.8, SOME_MORE), (0.5, A_FEW),
 )  # fmt: skip
 #: the same where the usual one passes, or leaves out much: members are too long for thin parts rather than too short
 SHORTER_FIRST = (
-    (1 / 1.4, A_FEW), (1.4, A_FEW), (0.5, A_FEW), (1.0, SOME_MORE), (2.0, A_FEW), (1 / 1.4, SOME_MORE), (1.4, SOME_MORE),
+    (1 / 1.4, A_FEW), (1.4, A_FEW), (1.0, SOME_MORE), (0.5, A_FEW), (2.0, A_FEW), (1 / 1.4, SOME_MORE), (1.4, SOME_MORE),
     (2.8, A_FEW), (2.0, SOME_MORE),
 )  # fmt: skip
 NEARLY_NEXT = 1.45  # ratio of lengths that pass up to which the longer one stands for the next to the shorter
