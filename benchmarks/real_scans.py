@@ -77,12 +77,12 @@ SCANS = (
 )  # fmt: skip
 
 WEAKEST = (
-    "One range scan of the bunny from the side is refused at the longer length: an ear and another part have no grid, 20 % of"
-    " the scan. At the shorter length its narrow parts are single rows of triangles.",
+    "One range scan of the bunny from the side is refused at both lengths, and `info` finds none that passes: the grid has a node far"
+    " off the scan, or leaves out an ear and another part, a tenth of the scan.",
     "The vase gets members of a seventh of its height, because no shorter length that `info` tries passes. Lip and handle are"
     " smoothed away, and no line says so, as they lie within half a member of the grid.",
-    "The figure with thin limbs passes with less effort than asked for, and its feet, ears and arms are coarse: they are hardly"
-    " three members round. At the longer length both feet are cut off, which is said.",
+    "The figure with thin limbs passes because limbs are cut off and slits filled, which is said; its feet, ears and arms are coarse:"
+    " they are hardly three members round.",
 )
 HEAD = """\
 # Real scans
