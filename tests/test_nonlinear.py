@@ -17,7 +17,8 @@ import scantruss as st
 from scantruss.structure.corotational import FARTHEST_TURN, Members, answer, respond
 from scantruss.structure.imperfections import fair_deviation
 from scantruss.structure.mixture import Mixture
-from scantruss.structure.nonlinear import Path, solve_path
+from scantruss.structure.nonlinear import solve_path
+from scantruss.structure.path import Path
 from scantruss.structure.truss import LoadCase, Truss
 
 FLAT = (np.inf, np.inf, np.inf, np.inf, 0.0, np.inf)  # held in place, turning about y

@@ -228,8 +228,8 @@ def even_out(mesh: WorkingMesh, grid: Grid, length: float) -> None:
     before, after = _corners(panels)
     normals = mesh.patches[:count, 3:6]
     at_boundary = np.zeros(count, np.bool_)
-    rim = grid.edges[seam]
-    at_boundary[rim.ravel()] = True
+    seam_members = grid.edges[seam]
+    at_boundary[seam_members.ravel()] = True
     slides = np.flatnonzero(kind == ON_CURVE)
     for _ in range(HEXAGON_STEPS):
         way = nodes[b] - nodes[a]
@@ -243,7 +243,7 @@ def even_out(mesh: WorkingMesh, grid: Grid, length: float) -> None:
         move *= HEXAGON_STEP * target[:, None]
         move -= (move * normals).sum(axis=1, keepdims=True) * normals
         move[kind >= AT_REST] = 0.0
-        along = ways_along(nodes, rim)[slides]
+        along = ways_along(nodes, seam_members)[slides]
         move[slides] = (move[slides] * along).sum(axis=1, keepdims=True) * along
         nodes += move
     slide_back(mesh, count)

@@ -37,10 +37,10 @@ def slide_back(mesh: WorkingMesh, count: int) -> None:
         net.nodes[v] = place
 
 
-def ways_along(nodes: np.ndarray, rim: np.ndarray) -> np.ndarray:
-    """Return a unit vector along the boundary or a line at each of its nodes (V, 3), either way; rim: their members (B, 2)."""
+def ways_along(nodes: np.ndarray, members: np.ndarray) -> np.ndarray:
+    """Return a unit vector along the boundary or a line at each of its nodes (V, 3), either way; members: their members (B, 2)."""
     nearest, total = np.full(len(nodes), -1), np.zeros_like(nodes)
-    for v, w in (*rim.tolist(), *rim[:, ::-1].tolist()):
+    for v, w in (*members.tolist(), *members[:, ::-1].tolist()):
         sign = -1.0 if nearest[v] >= 0 else 1.0
         nearest[v] = w
         total[v] += sign * (nodes[w] - nodes[v])

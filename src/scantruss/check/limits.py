@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 WARN_ANGLE = 25.0  # angle of a triangle below which it is poor [degree]
 WARN_WIDE = 150.0  # angle within a panel of more than three nodes above which it is poor [degree]
 WARN_SHORT, WARN_LONG = 0.6, 1.6  # members below and above which they are poor [desired lengths]
-HEXAGON_RIM = 3.0**0.5  # members of the boundary of even hexagons [desired lengths]
+HEXAGON_BOUNDARY = 3.0**0.5  # members of the boundary of even hexagons [desired lengths]
 WARN_FOLD = 45.0  # angle between neighbouring triangles below which the fold is poor [degree]
 WARN_OFFSET = 0.05  # distance of a node from the scan, beyond its noise, from which on that is poor [member lengths]
 NOISES_OFF = 3.0  # rms distances of points from their plane that are noise
@@ -73,7 +73,7 @@ def _figures(grid: Grid, found: Distances, settings: Settings) -> list[Figure]:
     """Return all figures of a grid that have limits."""
     at_nodes = np.full(len(grid.nodes), settings.length) if grid.desired is None else grid.desired
     free = ~grid.fixed[grid.edges].all(axis=1)
-    halves = grid.nodes[grid.edges].mean(axis=1) + grid.origin
+    middles = grid.nodes[grid.edges].mean(axis=1) + grid.origin
     lengths = grid.lengths[free] / at_nodes[grid.edges].mean(axis=1)[free]
     panels = grid.panel_table
     angles = np.where((grid.fixed[panels] | (panels < 0)).all(axis=1)[:, None], np.nan, grid.corner_angles)
@@ -90,11 +90,11 @@ def _figures(grid: Grid, found: Distances, settings: Settings) -> list[Figure]:
                "has an angle of {:.1f} degrees", largest=False),
         Figure("wide", inner[np.isfinite(inner)], grid.nodes[panels[np.isfinite(inner)]] + grid.origin,
                180.0 + settings.min_angle, WARN_WIDE, "has a panel with an angle of {:.0f} degrees"),
-        Figure("short", lengths, halves[free], settings.min_length, WARN_SHORT,
+        Figure("short", lengths, middles[free], settings.min_length, WARN_SHORT,
                "has a member of {:.2f} desired lengths", largest=False),
-        Figure("long", lengths, halves[free], settings.max_length, WARN_LONG * (HEXAGON_RIM if hexagons else 1.0),
+        Figure("long", lengths, middles[free], settings.max_length, WARN_LONG * (HEXAGON_BOUNDARY if hexagons else 1.0),
                "has a member of {:.2f} desired lengths"),
-        Figure("folded", folds[np.isfinite(folds)], halves[np.isfinite(folds)], settings.min_fold, WARN_FOLD,
+        Figure("folded", folds[np.isfinite(folds)], middles[np.isfinite(folds)], settings.min_fold, WARN_FOLD,
                "is folded to {:.1f} degrees", largest=False),
         Figure("offset", off, grid.nodes[measured] + grid.origin, settings.max_offset, WARN_OFFSET,
                "has a node {:.2f} members off the scan, its noise aside"),

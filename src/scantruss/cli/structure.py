@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 
     from ..grid.grid import Grid
     from ..runtime.progress import Progress
-    from ..structure.nonlinear import Path as StructurePath
     from ..structure.options import StructureSettings
+    from ..structure.path import Path as StructurePath
     from ..structure.report import StructureReport
     from ..structure.statics import Solution
     from ..structure.truss import Truss

@@ -35,9 +35,7 @@ FOLD_OVER_SMOOTH = 10.0  # how much better a fold must fit than a smooth surface
 ROUGHEST_SIDE = 0.12  # points farther from a fold than this follow neither side [member lengths]
 LOOK_SPACING = 0.33  # places closer together than this are not looked at twice [member lengths]
 MOST_SAMPLES = 4000  # most samples from which folds are looked for, the sharpest first
-FALSE_FOLDS_OF_ROUGH = (
-    12  # places in a row that look folded and are no ridge, after which the scan is rough: only long ridges count
-)
+FALSE_FOLDS_OF_ROUGH = 12  # places in a row that look folded and are no ridge, after which only long ridges count
 MOST_FALSE_FOLDS = 80  # such places in a row after which the search stops
 LEAST_ROUGH_RIDGE = 6.0  # least length of a line of folds on a rough scan [member lengths]
 ROUGH_SHARE = 1.4  # share of the ridge angle by which half of such a line is folded at least

@@ -44,8 +44,13 @@ ACTIONS = ("permanent", *COMPANION)
 ON_AREAS = ("cladding", "snow", "half-snow", "wind")
 LOAD_WORDS = "self, cladding:P, snow:P, half-snow:P, wind:P:C, temperature:T"
 ONCE = ("self", "snow", "temperature")  #: loads of which a second one is a slip
-HALVES = (0.0, 90.0, 180.0, 270.0)  #: directions of half the snow, unless told otherwise [degree from x]
-ALL_HALVES = tuple(30.0 * k for k in range(12))  #: those of `@all`
+HALF_SNOW_DIRECTIONS = (
+    0.0,
+    90.0,
+    180.0,
+    270.0,
+)  #: directions of half the snow, unless others are given [degree from x]
+ALL_DIRECTIONS = tuple(30.0 * k for k in range(12))  #: those of `@all`
 MOST_COMBINATIONS = 200  #: made without being asked for one by one
 
 
@@ -67,7 +72,7 @@ def cases_of(truss: Truss, loads: str | Sequence[Any], node_allowance: float = 0
                 f"the load {name} is given {words.count(name)} times; give it once, or cases of other names in a file"
             )
     found: dict[str, LoadCase] = {}
-    halves: set[str] = set()
+    half_snow: set[str] = set()
     for load in given:
         if isinstance(load, LoadCase):
             made = [load]
@@ -75,9 +80,9 @@ def cases_of(truss: Truss, loads: str | Sequence[Any], node_allowance: float = 0
             made = [_of_table(truss, load, node_allowance)]
         else:
             made = _of_words(truss, str(load).strip(), node_allowance)
-            if twice := next((case.name for case in made if case.name in halves), ""):
+            if twice := next((case.name for case in made if case.name in half_snow), ""):
                 raise InputError(f"the load {twice} is given 2 times; give each direction once")
-            halves |= {case.name for case in made if case.name.startswith("half-snow")}
+            half_snow |= {case.name for case in made if case.name.startswith("half-snow")}
         for case in made:
             found[case.name] = _added(found[case.name], case) if case.name in found else case
     if not found:
@@ -88,7 +93,7 @@ def cases_of(truss: Truss, loads: str | Sequence[Any], node_allowance: float = 0
 def usual_combinations(cases: Sequence[LoadCase]) -> tuple[Combination, ...]:
     """Return the combinations of EN 1990: 6.10 with tables A1.1 and A1.2(B) for ULS, 6.14b for SLS.
 
-    Cases of one variable action exclude each other, such as the halves of snow. Each leads once alone and once with every
+    Cases of one variable action exclude each other, such as snow on one half or another. Each leads once alone and once with every
     choice of one case of each other action. Wind also acts with permanent loads that hold against it.
     """
     permanent = [case.name for case in cases if case.action == "permanent"]
@@ -173,7 +178,7 @@ def _of_words(truss: Truss, words: str, node_allowance: float) -> list[LoadCase]
         return [LoadCase(name, action, nodal=(_cladding if name == "cladding" else _snow)(areas, value))]
     if not areas.plan.any():
         raise InputError("no part of the grid faces up, so there is no half of snow")
-    ways = ALL_HALVES if every else HALVES if angle is None else (angle,)
+    ways = ALL_DIRECTIONS if every else HALF_SNOW_DIRECTIONS if angle is None else (angle,)
     return [LoadCase(f"half-snow {way:g}", "snow", nodal=_on_half(areas, value, way)) for way in ways]
 
 

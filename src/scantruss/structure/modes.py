@@ -24,11 +24,8 @@ from .truss import GRAVITY, Truss
 FEW_FREEDOMS = 200  #: up to which all modes are found at once by dense matrices
 SEVERAL_LEADING = 3  #: combinations of which buckling is looked at, with different leading actions
 ROUGH = 1e-2  #: relative error of the first estimate
-MODE_SHIFTS = (
-    0.97,
-    0.8,
-    0.5,
-)  #: shares of the first value about which the others are looked for, until none lies before
+#: shares of the first value about which the others are looked for, until none lies before
+MODE_SHIFTS = (0.97, 0.8, 0.5)
 NEGLIGIBLE = 1e-9  #: share of the largest eigenvalue below which one is nil
 
 

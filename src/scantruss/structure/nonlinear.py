@@ -21,6 +21,7 @@ from .imperfections import Imperfection, imperfection_of
 from .mechanism import product
 from .mixture import Mixture
 from .modes import Modes, buckling_modes, worst_buckling
+from .path import Path
 from .statics import Factored, factor_stiffness, solve
 from .truss import LoadCase, Truss
 
@@ -47,44 +48,6 @@ REFINEMENTS = 14  #: of the place where stability is lost
 CRITICAL = 1e-3  #: share of the smallest eigenvalue, and of the arc length, at which stability is lost
 NEARLY_SAME = (0.05, 1e-5)  #: or the share of the arc length with a relative distance of load factors
 SAME_FACTOR = 1e-7  #: relative distance of load factors that are one
-
-
-@dataclass(frozen=True, eq=False)
-class Path:
-    """The equilibrium states of a structure under a load that grows from nothing; the first is without it."""
-
-    truss: Truss  #: as it stands without loads, with its imperfection
-    name: str  #: of the load case or combination
-    imperfection: Imperfection
-    factors: np.ndarray  #: (S,) load factors
-    displacements: np.ndarray  #: (S, V, 6) displacements and rotation vectors [m, rad]
-    reactions: np.ndarray  #: (S, V, 6) [N, Nm]
-    axial: np.ndarray  #: (S, M) axial forces, tension positive [N]
-    equilibrium_errors: np.ndarray  #: (S,) what forces leave on free nodes, over their size
-    negative_pivots: np.ndarray  #: (S,) ways in which a state is not stable
-    critical: int | None  #: the last stable state, where the structure loses its stability, refined
-    kind: str  #: of that: limit point, bifurcation or ""
-    ended: str  #: why the path ends, in words
-    linear_factor: float | None  #: the linear buckling factor of the structure without imperfection
-
-    @property
-    def limit_factor(self) -> float | None:
-        """The load factor at which the structure loses its stability; None where it does not on this path."""
-        return None if self.critical is None else float(self.factors[self.critical])
-
-    @property
-    def node(self) -> int:
-        """The node that moves most, where stability is lost or at the end."""
-        at = len(self.factors) - 1 if self.critical is None else self.critical
-        return int(np.linalg.norm(self.displacements[at, :, :3], axis=1).argmax())
-
-    @property
-    def moves(self) -> np.ndarray:
-        """(S,) displacement of that node, along the direction it has then [m]."""
-        at = len(self.factors) - 1 if self.critical is None else self.critical
-        way = self.displacements[at, self.node, :3]
-        made: np.ndarray = self.displacements[:, self.node, :3] @ way / max(float(np.linalg.norm(way)), 1e-300)
-        return made
 
 
 def solve_path(

@@ -6,7 +6,8 @@ import io
 from typing import Any
 
 from ..runtime.ours import MARK
-from .nonlinear import CUTS, PATH_STEPS, Path
+from .nonlinear import CUTS, PATH_STEPS
+from .path import Path
 from .truss import Truss
 
 SECONDS = 3e-5  #: of a step for each displacement of a node, on a usual machine

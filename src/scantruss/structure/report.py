@@ -15,7 +15,7 @@ from .doubts import doubts_of
 from .groups import member_groups_of
 from .layers import LayerChecks, check_layers
 from .modes import Modes
-from .nonlinear import Path
+from .path import Path
 from .path_report import path_figures, path_warnings, path_words
 from .sizing import SizingRound
 from .statics import CaseResult, Solution
@@ -272,14 +272,14 @@ def unlisted_lines(report: StructureReport) -> list[str]:
 
 def half_lines(report: StructureReport) -> list[str]:
     """Return a line on the worst half of snow, where there are several."""
-    halves = [case for case in report.cases if case.state == "case" and case.name.startswith("half-snow ")]
-    if len(halves) < 2:
+    part_loaded = [case for case in report.cases if case.state == "case" and case.name.startswith("half-snow ")]
+    if len(part_loaded) < 2:
         return []
-    moved = max(halves, key=lambda case: case.displacement_max)
-    used = max(halves, key=lambda case: case.utilization_max or 0.0)
+    moved = max(part_loaded, key=lambda case: case.displacement_max)
+    used = max(part_loaded, key=lambda case: case.utilization_max or 0.0)
     most = f", {used.name} uses the members most, {use_words(used.utilization_max)}" if used.utilization_max else ""
     return [
-        f"of {len(halves)} halves of snow {moved.name} moves the nodes most, {1e3 * moved.displacement_max:.3g} mm{most}"
+        f"of {len(part_loaded)} cases of half the snow {moved.name} moves the nodes most, {1e3 * moved.displacement_max:.3g} mm{most}"
     ]
 
 

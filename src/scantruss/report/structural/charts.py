@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from ...export.drawing.strokes import INK
-from ...structure.nonlinear import Path
+from ...structure.path import Path
 from ...structure.path_report import draw_path, moves_label
 from ...structure.sizing import SizingRound
 from .parts import Frame

@@ -14,7 +14,7 @@ MOST_OF_BYTE, MOST_OF_WORD = 255.0, 65535.0
 def own_colors(attributes: Mapping[str, np.ndarray]) -> np.ndarray | None:
     """Return the colours of points (N, 3) uint8 from the attributes of `COLOR_ATTRIBUTES` or `PACKED_COLOR`; None without these.
 
-    Numbers up to 1, 255 or 65,535 are told apart by the largest; a file of all dark words is taken for bytes.
+    Numbers up to 1, 255 or 65,535 are distinguished by the largest; a file of all dark words is taken for bytes.
     """
     if all(name in attributes for name in COLOR_ATTRIBUTES):
         values = np.stack([np.asarray(attributes[name], np.float64) for name in COLOR_ATTRIBUTES], axis=1)
