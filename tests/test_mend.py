@@ -13,12 +13,13 @@ from rough import Rough, rough_disc, rough_sphere
 
 import scantruss as st
 from scantruss.check.distances import boxes_of, distances_to_planes, points_of_planes
+from scantruss.check.folds import fold_angles
 from scantruss.check.limits import NOISES_OFF
 from scantruss.improve.equalize import equalize
-from scantruss.improve.mend import mend_poor_places, poor_places
+from scantruss.improve.mend import fold_angles_of, mend_poor_places, poor_places
 from scantruss.improve.off_scan import MOST_OFF, put_on_scan
 from scantruss.improve.working_mesh import Kept, WorkingMesh
-from scantruss.kernels.mesh.grid import split
+from scantruss.kernels.mesh.grid import list_triangles, split
 from scantruss.surface.samples import SurfaceSamples, sample_surface
 
 
@@ -79,6 +80,34 @@ def test_a_grid_without_poor_places_keeps_its_bytes() -> None:
     assert poor_places(mesh, rough.settings).faults == 0.0
     assert not mend_poor_places(mesh, rough.settings)
     assert all((one == other).all() for one, other in zip(before.net, mesh.net, strict=True))
+
+
+@given(some.integers(0, 1000))
+def test_angles_between_triangles_are_those_of_the_certificate(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    grid = rough_disc(length=0.35, points=500, seed=seed).grid
+    grid = grid.replace(nodes=grid.nodes + 0.2 * rng.normal(size=grid.nodes.shape))
+    wanted = {tuple(edge): angle for edge, angle in zip(grid.edges.tolist(), fold_angles(grid), strict=True)}
+    found = fold_angles_of(grid.nodes, grid.triangles)
+    for triangle, angles in zip(grid.triangles.tolist(), found, strict=True):
+        for k in range(3):
+            angle = wanted[tuple(sorted((triangle[k], triangle[(k + 1) % 3])))]
+            assert angles[k] == pytest.approx(180.0 if np.isnan(angle) else angle, abs=1e-4)
+
+
+@compiled_only
+def test_triangles_folded_onto_each_other_are_mended() -> None:
+    rough, mesh, _ = settled()
+    net = mesh.net
+    v = int(np.flatnonzero(net.degree == 6)[0])
+    ring = net.ring[v, :6]
+    across = net.nodes[ring[0]] - net.nodes[ring[3]]
+    net.nodes[v] = net.nodes[ring].mean(axis=0) + 0.75 * across  # beyond its neighbours
+    triangles = poor_places(mesh, rough.settings).worst
+    assert any(v in triangle for triangle in triangles.tolist())
+    assert mend_poor_places(mesh, rough.settings)
+    room = np.empty((int(net.degree[: net.used].sum()) + 1, 3), np.int64)
+    assert fold_angles_of(net.nodes, room[: list_triangles(net, room)]).min() > 90.0
 
 
 @compiled_only

@@ -202,7 +202,7 @@ def reach_tips_of(
     mesh, of_scan = candidate.mesh, (candidate.front, samples, constraints, candidate.settings)
 
     def faults_of(grid: Grid, cost: float) -> list[Place] | None:
-        """Take the grid that the mesh has become where it is better; else return the places of what went wrong."""
+        """Take the grid that the mesh has become where it is better; else return the places of what went wrong in it."""
         before, candidate.grid = (
             candidate.grid,
             checked(finish_rings(grid, boundary).replace(settings=settings), samples, boundary, settings),
@@ -211,7 +211,8 @@ def reach_tips_of(
             return None
         found = candidate.grid.certificate
         candidate.grid = before
-        return [fault.where for fault in (found.faults if found else ()) if fault.where]
+        faults = found.faults if found else ()
+        return [fault.where for fault in faults if fault.where and fault.kind != "cover"]
 
     given_up: list[Place] = []
     reached = False

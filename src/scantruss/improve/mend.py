@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from ..settings import Settings
 
 POOR_ANGLE_MARGIN = 5.0  # an angle is poor that is not by so much larger than the least allowed [degree]
+POOR_FOLD_MARGIN = 5.0  # two triangles are folded whose angle is not by so much larger than the least allowed [degree]
 POOR_LENGTH_MARGIN = 0.06  # a member is poor that is not by so much within the lengths allowed [desired length]
 MOST_POOR_PLACES = 16  # poor places that are mended at most; where there are more, the whole grid is
 MENDING_ENERGY = 1.5  # most energy that mending a place may cost
@@ -73,11 +74,27 @@ def poor_places(mesh: WorkingMesh, settings: Settings) -> PoorPlaces:
     least, most = settings.min_length + POOR_LENGTH_MARGIN, settings.max_length - POOR_LENGTH_MARGIN
     off = np.where(fixed, 0.0, np.maximum(1.0 - sizes / least, sizes / most - 1.0))
     wide = settings.min_angle + POOR_ANGLE_MARGIN
+    flat = 1.0 - fold_angles_of(net.nodes, triangles) / (settings.min_fold + POOR_FOLD_MARGIN)
     held = np.asarray(mesh.fixed[triangles].all(axis=1))
     narrow = np.where(held[:, None], 0.0, 1.0 - angles / wide)
-    faults = np.maximum(off, 0.0).sum(axis=1) + np.maximum(narrow, 0.0).sum(axis=1)
+    faults = sum(np.maximum(part, 0.0).sum(axis=1) for part in (off, narrow, flat))
     order = np.argsort(-faults, kind="stable")[: int((faults > 0.0).sum())]
     return PoorPlaces(float(faults.sum()), triangles[order])
+
+
+def fold_angles_of(nodes: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Return the angle at each side of triangles (T, 3) to the triangle beyond it (T, 3) [degree]: 180 level and where there is none."""
+    ends = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
+    key = ends.min(axis=1) * len(nodes) + ends.max(axis=1)
+    order = np.argsort(key, kind="stable")
+    same = np.flatnonzero(key[order][1:] == key[order][:-1])
+    sides = np.stack([order[same], order[same + 1]], axis=1)
+    across = np.cross(*(nodes[triangles[:, k]] - nodes[triangles[:, 0]] for k in (1, 2)))
+    across /= np.maximum(np.linalg.norm(across, axis=1), 1e-300)[:, None]
+    cosine = (across[sides[:, 0] // 3] * across[sides[:, 1] // 3]).sum(axis=1)
+    angles = np.full(len(ends), 180.0)
+    angles[sides] = 180.0 - np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))[:, None]
+    return angles.reshape(-1, 3)
 
 
 def _mend(
