@@ -77,12 +77,12 @@ SCANS = (
 )  # fmt: skip
 
 WEAKEST = (
-    "One range scan of the bunny from the side is refused at both lengths, and `info` finds none that passes: the grid has a node far"
-    " off the scan, or leaves out an ear and another part, a tenth of the scan.",
     "The vase gets members of a seventh of its height, because no shorter length that `info` tries passes. Lip and handle are"
     " smoothed away, and no line says so, as they lie within half a member of the grid.",
-    "The figure with thin limbs passes because limbs are cut off and slits filled, which is said; its feet, ears and arms are coarse:"
-    " they are hardly three members round.",
+    "The figure with thin limbs passes because slits are filled and arms cut off, which is said: its feet grow into one. With members"
+    " a third shorter it keeps both feet and its ears.",
+    "The range scans of the bunny have rims with notches and bridged gaps, where the scanner saw little; a front paw is a piece by"
+    " itself, or left out.",
 )
 HEAD = """\
 # Real scans
