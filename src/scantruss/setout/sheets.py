@@ -25,7 +25,7 @@ LAYERS = (
     HEIGHT_LINES,
     GROUND_LINES,
 )
-BELOW, ROOM = 5.6, 20.0  # where heights are written, and room between rows, over the height of words
+BELOW, ROOM = 6.4, 22.0  # where heights are written, and room between rows, over the height of words
 BESIDE, LEADER = (
     1.3,
     1.2,
