@@ -43,18 +43,17 @@ class GrowthOfStructures:
     nodes: tuple[int, ...]
     one_case: tuple[float, ...]  #: [s]
     four_modes: tuple[float, ...]  #: [s]
-    command: tuple[float, ...]  #: `scantruss structure` from file to file, more than its start [s]
-    memory: tuple[float, ...]  #: of the command at its peak [MB]
+    command: tuple[float, ...]  #: `scantruss structure` with its start, from file to file [s]
 
     def exponent(self, times: tuple[float, ...]) -> float:
         return float(np.polyfit(np.log(self.nodes), np.log(times), 1)[0])
 
     def rows(self) -> list[str]:
-        columns = zip(self.nodes, self.one_case, self.four_modes, self.command, self.memory, strict=True)
-        shown = [f"| {n:,} | {a:.3f} | {b:.3f} | {c:.2f} | {m:,.0f} |" for n, a, b, c, m in columns]
-        exponents = [f"{self.exponent(times):.2f}" for times in (self.one_case, self.four_modes, self.command)]
-        head = "| nodes | one load case [s] | four buckling modes [s] | `scantruss structure`, two load cases [s] | its memory [MB] |"
-        return [head, "| ---: | ---: | ---: | ---: | ---: |", *shown, f"| exponent | {' | '.join(exponents)} | |"]
+        columns = zip(self.nodes, self.one_case, self.four_modes, self.command, strict=True)
+        shown = [f"| {n:,} | {a:.3f} | {b:.3f} | {c:.2f} |" for n, a, b, c in columns]
+        last = f"| exponent | {self.exponent(self.one_case):.2f} | {self.exponent(self.four_modes):.2f} | |"
+        head = "| nodes | one load case [s] | four buckling modes [s] | `scantruss structure`, two load cases [s] |"
+        return [head, "| ---: | ---: | ---: | ---: |", *shown, last]
 
 
 def shell(side: int, cases: int = 1) -> Truss:
@@ -78,9 +77,8 @@ def least(work: Callable[[], Any], rounds: int = 2) -> float:
     return min(processor(work) for _ in range(rounds))
 
 
-def command_on(side: int) -> tuple[float, float]:
-    """Return seconds of the processor of `scantruss structure` on a dome, more than of its help, and the memory at its peak [MB]."""
-    started = spent_by("structure", "--help")[0]
+def command_on(side: int) -> float:
+    """Return the seconds of the processor that `scantruss structure` takes on a dome; Linux."""
     with tempfile.TemporaryDirectory() as folder:
         st.write(dome(side, 2.0, unit="m"), Path(folder) / "grid.json")
         words = [
@@ -92,18 +90,12 @@ def command_on(side: int) -> tuple[float, float]:
             "--loads",
             "self,snow:1kN/m2",
         ]
-        seconds, memory = spent_by(*words)
-    return seconds - started, memory
-
-
-def spent_by(*words: str) -> tuple[float, float]:
-    """Return seconds of the processor of a command, and its memory at its peak [MB]; Linux."""
-    process = subprocess.Popen([sys.executable, "-m", "scantruss", *words], stdout=subprocess.DEVNULL)
-    _, status, used = os.wait4(process.pid, 0)
+        process = subprocess.Popen([sys.executable, "-m", "scantruss", *words], stdout=subprocess.DEVNULL)
+        _, status, used = os.wait4(process.pid, 0)
     process.returncode = os.waitstatus_to_exitcode(status)
     if process.returncode:
-        raise RuntimeError(f"scantruss {words[0]} failed")
-    return used.ru_utime + used.ru_stime, used.ru_maxrss / 1e3
+        raise RuntimeError("scantruss structure failed")
+    return used.ru_utime + used.ru_stime
 
 
 def growth(sides: tuple[int, ...]) -> GrowthOfStructures:
@@ -116,8 +108,7 @@ def growth(sides: tuple[int, ...]) -> GrowthOfStructures:
         one.append(least(lambda: st.solve(truss)))  # noqa: B023
         modes.append(least(lambda: buckling_modes(factored, solution.cases[0], 4)))  # noqa: B023
         command.append(command_on(side))
-    times, memory = zip(*command, strict=True)
-    return GrowthOfStructures(tuple(nodes), tuple(one), tuple(modes), times, memory)
+    return GrowthOfStructures(tuple(nodes), tuple(one), tuple(modes), tuple(command))
 
 
 def section(command_line: str, quick: bool = False) -> Section:
