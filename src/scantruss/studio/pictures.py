@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 LARGE_PICTURE = (2160, 3840)  #: height and width of a picture [pixel]
 TURN_SIZE = (540, 960)  #: height and width of a turntable [pixel]
 TURN_FRAMES, TURN_MILLISECONDS = 36, 100  #: of a turntable, and how long each is shown
-POINTS_TO_FIT, ROOM_AROUND = 5_000, 1.1  #: points that a turntable must show, and what it shows over what it must
+TURNED_POINTS, ROOM_AROUND = 5_000, 1.1  #: points that a turntable must show, and what it shows over what it must
 PICTURE_PATIENCE = 120.0  #: how long the browser may take for a picture [s]
 BEHIND_PICTURE = {False: (255, 255, 255), True: (20, 20, 20)}  #: behind a picture of a light and a dark page
 
@@ -41,7 +41,7 @@ class PictureTool:
         position, target = np.array(camera.position), np.array(camera.look_at)
         turns = [2 * np.pi * k / TURN_FRAMES for k in range(TURN_FRAMES)]
         places = np.array([target + about_z(turn) @ (position - target) for turn in turns])
-        every = max(1, len(cloud.points) // POINTS_TO_FIT)
+        every = max(1, len(cloud.points) // TURNED_POINTS)
         drawn = self.view.frame.to_scene(np.asarray(cloud.points[::every]) + cloud.origin)
         fov = min(float(camera.fov), angle_to_see(drawn, places, target, TURN_SIZE[1] / TURN_SIZE[0]))
         frames = [self._shot(*TURN_SIZE, wxyz=facing(at, target), position=tuple(at), fov=fov) for at in places]
