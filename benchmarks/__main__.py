@@ -16,13 +16,19 @@ from pathlib import Path
 from . import own
 from .page import Section, write
 
-PARTS = ("speed", "examples", "surface", "random", "scans", "peers")
+PARTS = ("speed", "structures", "examples", "surface", "random", "scans", "peers")
 QUICK_PARTS = ("speed", "examples", "peers")
 PATHS = ("--data", "--page")  # options whose values say more of a machine than of a measurement
 
 
 def _speed(options: argparse.Namespace, command: str) -> Section:
     from .speed import section
+
+    return section(command, options.quick)
+
+
+def _structures(options: argparse.Namespace, command: str) -> Section:
+    from .structures import section
 
     return section(command, options.quick)
 
@@ -67,8 +73,14 @@ def _peers(options: argparse.Namespace, command: str) -> Section:
 
 
 MAKERS: dict[str, Callable[[argparse.Namespace, str], Section | None]] = {
-    "speed": _speed, "examples": _examples, "surface": _surface, "random": _random, "scans": _scans, "peers": _peers,
-}  # fmt: skip
+    "speed": _speed,
+    "structures": _structures,
+    "examples": _examples,
+    "surface": _surface,
+    "random": _random,
+    "scans": _scans,
+    "peers": _peers,
+}
 
 
 def _words(text: str) -> list[str]:

@@ -15,6 +15,7 @@ ORDER = (
     LOST,
     "Against everyone",
     "Speed",
+    "Structures",
     "Table 2: the examples of the paper",
     "Table 3: by way of a surface",
     "Simulated and real scans",

@@ -5,8 +5,9 @@ from pathlib import Path
 from clouds import make
 
 import scantruss as st
-from scantruss.report.structural.contents import ReportSource, report_parts
+from scantruss.report.structural.contents import report_parts
 from scantruss.report.structural.html import encode_html
+from scantruss.report.structural.source import ReportSource
 from scantruss.structure.modes import worst_buckling
 from scantruss.structure.options import StructureSettings
 from scantruss.structure.report import StructureReport, report_structure

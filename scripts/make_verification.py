@@ -312,6 +312,7 @@ def _shells() -> Iterator[Proof]:
         truss = Truss.from_grid(dome(6, 40.0), scale=50, supports=supports, support_type="fixed", loads=SHELL)
         solution = solve(truss)
         model = pynite_model(truss, solution.cases)
+        model.analyze_linear()
         for case in solution.cases:
             moves = [
                 [getattr(model.nodes[mark], way)[case.name] for way in ("DX", "DY", "DZ")] for mark in truss.node_marks

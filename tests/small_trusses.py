@@ -62,7 +62,7 @@ def line_of(length: float, count: int, axis: tuple[float, float, float] = (1, 0,
 
 
 def pynite_model(truss: Truss, results: Iterable[CaseResult]) -> Any:
-    """Return a structure of tubes, held where it is supported, solved by PyNite under the nodal loads of some results."""
+    """Return a structure of tubes, held where it is supported, with the nodal loads of some results, for PyNite to solve."""
     from Pynite import FEModel3D
 
     model = FEModel3D()
@@ -79,5 +79,4 @@ def pynite_model(truss: Truss, results: Iterable[CaseResult]) -> Any:
             for way, value in zip(("FX", "FY", "FZ"), force, strict=False):
                 model.add_node_load(mark, way, float(value), case=case.name)
         model.add_load_combo(case.name, {case.name: 1.0})
-    model.analyze_linear()
     return model

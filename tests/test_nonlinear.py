@@ -312,7 +312,9 @@ def test_of_both_signs_of_a_mode_the_lower_limit_counts() -> None:
     signs = [solve_path(truss, "cladding", imperfection=sign * both.imperfection.moves) for sign in (1.0, -1.0)]
     limits = [path.limit_factor or math.inf for path in signs]
     chosen = signs[int(np.argmin(limits))]
-    assert both.limit_factor == min(limits) and both.ended == chosen.ended
+    assert (
+        both.limit_factor == pytest.approx(min(limits), rel=1e-12) and both.ended == chosen.ended
+    )  # the dome is nearly symmetric
     assert both.factors == pytest.approx(chosen.factors, rel=1e-9)
 
 

@@ -17,7 +17,7 @@ import scantruss as st
 from scantruss.cli.main import main
 from scantruss.export.engraving import letter_height
 from scantruss.export.printed.nodes import build_nodes
-from scantruss.export.printed.parts import build_parts, check_apart, check_joint, divide
+from scantruss.export.printed.parts import Joint, build_parts, check_apart, check_joint, divide
 from scantruss.export.printed.plates import PrintedPart, lay_out, pack
 from scantruss.export.printed.write import print_parts
 from scantruss.export.solid import as_solid, build_solid, is_watertight, unite
@@ -77,6 +77,35 @@ def test_volumes_add_up_and_only_the_clearance_is_missing(name: str) -> None:
 
 def part_at(parts: list[PrintedPart], node: int) -> int:
     return next(k for k, part in enumerate(parts) if node in part.nodes)
+
+
+def test_both_halves_of_a_member_that_is_cut_carry_its_mark() -> None:
+    """Letters are taken off outside, clear of the ball and the coupling."""
+    plain, marked = (parts_of("fan", marks=marks) for marks in (False, True))
+    grid, joint = GRIDS["fan"](), Joint(3.0, SIZES["clearance"])
+    part_of = np.empty(len(grid.nodes), int)
+    for number, part in enumerate(marked):
+        part_of[part.nodes] = number
+    cut = grid.edges[part_of[grid.edges[:, 0]] != part_of[grid.edges[:, 1]]]
+    normals = find_joints(grid).normal
+    taken = [
+        np.concatenate(
+            [
+                each.to_mesh64().vert_properties[:, :3]
+                for each in (one.body - other.body).decompose()
+                if each.volume() > 1e-3
+            ]
+        )
+        for one, other in zip(plain, marked, strict=True)
+    ]
+    assert len(cut) > 2
+    for near, far in [*cut.tolist(), *cut[:, ::-1].tolist()]:
+        way = (grid.nodes[far] - grid.nodes[near]) / np.linalg.norm(grid.nodes[far] - grid.nodes[near])
+        points = taken[part_of[near]] - grid.nodes[near]
+        along = points @ way
+        across = points - along[:, None] * way
+        clear = (along > 3.0) & (along < 20.0 - joint.reach) & (np.linalg.norm(across, axis=1) < 1.5 + 1e-6)
+        assert clear.sum() > 20 and (across[clear] @ (normals[near] + normals[far]) > 0).all()
 
 
 @pytest.mark.parametrize("name", ["dome", "closed"])
@@ -272,3 +301,10 @@ def test_parts_need_a_bed_of_three_sizes(tmp_path: Path) -> None:
     strip = make_grid([(0, 0, 0), (100, 0, 0), (50, 80, 0)], [(0, 1, 2)])
     made = print_parts(strip, tmp_path / "a.3mf", member_diameter=3.0, node_diameter=6.0, bed=(200.0, 200.0, 200.0))
     assert made.files == ("a_1.3mf",) and made.parts == 1
+
+
+def test_parts_lie_with_their_outside_and_its_marks_up() -> None:
+    normals = find_joints(GRIDS["dome"]()).normal
+    for part in parts_of("dome"):
+        assert part.flat[2] @ normals[part.nodes].sum(axis=0) > 0
+        assert np.linalg.det(part.flat) == pytest.approx(1.0)

@@ -21,7 +21,7 @@ from scantruss.setout import assembly
 from scantruss.setout.assembly import MOST_MOVE, MOST_TIMES, assembly_steps
 from scantruss.setout.files import _page, encode_dxf, encode_pdf, scale_on, setout_paths
 from scantruss.setout.lines import cut_grid
-from scantruss.setout.sheets import LAYERS, make_sheets
+from scantruss.setout.sheets import LAYERS, _apart, make_sheets
 from scantruss.structure.frame import freedoms, stiffness_matrix
 
 
@@ -150,6 +150,18 @@ def test_a_section_through_a_node_names_it() -> None:
     assert 0 in line.nodes and len(line.points) == len(np.unique(line.points.round(6), axis=0))
     with pytest.raises(st.InputError, match="x = 20000 meets no member; they reach from 0 to 2000 mm"):
         st.set_out(grid, st.SetoutSettings(supports="boundary", sections=(("x", 2e4),)))
+
+
+def test_words_of_a_section_stand_beside_each_other_near_their_places() -> None:
+    places = np.array([0.0, 0.1, 0.2, 5.0, 9.0, 9.0])
+    moved = _apart(places, 1.0)
+    assert moved == pytest.approx([-0.9, 0.1, 1.1, 5.0, 8.5, 9.5])
+    assert _apart(np.zeros(0), 1.0).tolist() == []
+    made = st.set_out(dome(8, 2.0, unit="m"), st.SetoutSettings(supports="boundary"))
+    for sheet in make_sheets(made):
+        if sheet.title.startswith("Section"):
+            written = sorted(each.place[0] for each in sheet.words if each.layer == "HEIGHTS")
+            assert np.diff(written).min() > 1.69 * sheet.height
 
 
 def test_unrolled_members_keep_their_length_and_a_loop_turns_once() -> None:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.linalg import eigh
 from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import splu
 from shapes import make
@@ -30,8 +31,10 @@ from small_trusses import (
 import scantruss as st
 from scantruss.grid.grid import Grid
 from scantruss.structure import modes as modes_module
+from scantruss.structure.lanczos import largest_eigenpairs
 from scantruss.structure.mechanism import pivots
 from scantruss.structure.modes import buckling_modes, vibration_modes, worst_buckling
+from scantruss.structure.ordering import dissected
 from scantruss.structure.report import report_structure
 from scantruss.structure.statics import IN_ORDER, factor_stiffness, solve
 from scantruss.structure.truss import LoadCase, Truss
@@ -329,6 +332,7 @@ def test_pynite_agrees(name: str) -> None:
     )
     ours = solve(truss)["cladding"], solve(truss)["wind 30"]
     model = pynite_model(truss, ours)
+    model.analyze_linear()
     for case in ours:
         theirs = np.array(
             [[getattr(model.nodes[m], d)[case.name] for d in ("DX", "DY", "DZ")] for m in truss.node_marks]
@@ -392,6 +396,45 @@ def test_modes_are_the_same_wherever_they_are_looked_for() -> None:
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(modes_module, "MODE_SHIFTS", shifts)
             assert buckling_modes(factored, snow, 3).values == pytest.approx(usual, rel=1e-8)
+
+
+def test_both_modes_of_a_double_value_are_found_among_many_freedoms() -> None:
+    """A slender column of a tube buckles and swings about both axes alike."""
+    nodes, members = line_of(8.0, 50, (0, 0, 1))
+    truss = make_truss(nodes, members, {0: HELD}, forces(51, {50: (0, 0, -1000.0)}))
+    factored = factor_stiffness(truss)
+    for modes in (buckling_modes(factored, solve(truss, factored)["load"], 6), vibration_modes(factored, 6)):
+        assert modes.values[::2] == pytest.approx(modes.values[1::2], rel=1e-8)
+        assert (np.diff(modes.values[::2]) > 0.1 * modes.values[0]).all()
+        sideways = modes.shapes[:, :, :2].reshape(6, -1)
+        sideways /= np.linalg.norm(sideways, axis=1)[:, None]
+        assert all(abs(one @ other) < 1 - 1e-3 for one, other in zip(sideways[::2], sideways[1::2], strict=True))
+
+
+@pytest.mark.parametrize("count", [1, 5, 40])
+def test_lanczos_finds_the_largest_eigenvalues_of_a_dense_twin(count: int) -> None:
+    rng = np.random.default_rng(count)
+    basis = np.linalg.qr(rng.standard_normal((40, 40)))[0]
+    matrix = basis @ np.diag([9.0, 9.0, *np.linspace(-3, 5, 36), 0.0, 0.0]) @ basis.T
+    metric = np.diag(rng.uniform(1, 3, 40))
+    found = largest_eigenpairs(splu(csc_matrix(metric)), csc_matrix(matrix), csc_matrix(metric), count, 1e-10)
+    assert found is not None
+    values, vectors = found
+    expected = eigh(matrix, metric, eigvals_only=True)[::-1][:count]
+    assert values == pytest.approx(expected, abs=1e-9) and vectors.shape == (40, count)
+    assert matrix @ vectors == pytest.approx(metric @ vectors * values, abs=1e-7)
+
+
+@pytest.mark.parametrize("count", [2, 5, 23])
+def test_nodes_are_eliminated_in_an_order_that_fills_in_little(count: int) -> None:
+    truss = Truss.from_grid(dome(count, 40.0), scale=50, supports="boundary", loads="self")
+    rank = dissected(truss)
+    assert np.array_equal(np.sort(rank), np.arange(len(rank)))
+    joined = np.eye(len(rank)) * 9
+    joined[tuple(truss.members.T)] = joined[tuple(truss.members.T[::-1])] = -1.0
+    inorder = np.argsort(rank)
+    fill = [splu(csc_matrix(joined[order][:, order]), **IN_ORDER).nnz for order in (np.arange(len(rank)), inorder)]
+    assert fill[1] < 0.8 * fill[0] or count < 6
 
 
 def test_pivots_leave_a_factor_as_it_was_and_no_copy_of_it() -> None:

@@ -13,9 +13,14 @@ from small_grids import dome
 
 import scantruss as st
 from scantruss.cli.main import main
+from scantruss.report.structural.contents import report_parts
+from scantruss.report.structural.parts import DataTable
 from scantruss.report.structural.pdf import WIDTH, _width, _wrapped
+from scantruss.report.structural.source import ReportSource, greatest_stresses
+from scantruss.report.structural.words import fixed, load_words, support_words
 from scantruss.runtime.ours import kind_of_ours
 from scantruss.structure.options import StructureSettings, read_structure_settings, settings_text
+from scantruss.structure.report import report_structure
 
 LOADS = "self,cladding:0.5kN/m2,snow:1kN/m2"
 
@@ -158,7 +163,7 @@ def test_what_is_left_out_of_a_table_is_said(place: Path) -> None:
     loads = f"{LOADS},half-snow:1kN/m2,wind:1kN/m2:-0.5,temperature:20K"
     assert run(f"a.html --loads {loads} --support-type fixed --frequencies 6") == 0
     text = " ".join(read("a.html").text)
-    assert "most moment [kNm]" in text and "The 60 greatest of 76" in text and "All values: " in text
+    assert "moment, greatest [kNm]" in text and "The 60 greatest of 76" in text and "All values: " in text
     assert "Those that use the members or move the nodes most" in text
 
 
@@ -202,3 +207,41 @@ def test_the_weight_curve_is_in_the_report(place: Path) -> None:
     assert rounds[-1]["utilization"] == pytest.approx(figures["utilization_max"]) and rounds[-1]["buckling"] >= 10
     assert [each["mass"] for each in rounds] == sorted(each["mass"] for each in rounds)
     assert list(masses) == ["1", "2", "3"]
+
+
+def test_loads_and_supports_are_said_in_words() -> None:
+    words = {
+        "self": "self-weight",
+        "cladding:0.5kN/m2": "cladding 0.5 kN/m2 on the surface",
+        "snow:1e3Pa": "snow 1e3 Pa on the area in plan",
+        "half-snow:1kN/m2@30": "snow 1 kN/m2 on half of the area in plan, towards 30 degrees from x",
+        "wind:0.8kN/m2:-0.7": "wind 0.8 kN/m2, coefficient -0.7 on the surface",
+        "wind:0.8kN/m2:0.8/-0.5@90": "wind 0.8 kN/m2 towards 90 degrees from x, coefficients 0.8 on what faces it and -0.5 on the rest",
+        "temperature:-30K": "change of temperature -30 K",
+    }
+    assert {load: load_words(load) for load in words} == words
+    assert load_words({"case": "lamp", "force": [0, 0, "-2kN"]}) == "lamp"
+    assert load_words({"case": "drift", "load": "snow:2kN/m2"}) == "drift (snow 2 kN/m2 on the area in plan)"
+    assert support_words("loop:1+lowest:0.6+N007") == "boundary loop 1 and nodes up to 0.6 m above the lowest and N007"
+    assert support_words("corners+line:rim") == "corners of the boundary and line rim"
+    assert [fixed(value, 1) for value in (-0.01, 0.0, -1234.56)] == ["0.0", "0.0", "-1,234.6"]
+
+
+def test_what_no_clause_checks_is_listed_by_its_stress() -> None:
+    grid = dome(5, 40.0)
+    truss = st.Truss.from_grid(
+        grid, scale=50, unit="mm", section="R100x200", material="GL24h", supports="boundary", loads=LOADS
+    )
+    solution = st.solve(truss)
+    stresses, causes = greatest_stresses(solution)
+    for member in (0, int(stresses.argmax())):
+        every = {
+            each.name: np.abs(each.stresses[member]).sum() for each in solution.all_results() if each.state == "ULS"
+        }
+        assert causes[member] == max(every, key=lambda name: every[name])
+        assert stresses[member] == pytest.approx(max(every.values()))
+    parts = report_parts(
+        ReportSource("dome", "", StructureSettings(supports="boundary"), solution, report_structure(solution))
+    )
+    listed = next(part for part in parts if isinstance(part, DataTable) and "axial stress [MPa]" in part.head)
+    assert listed.rows[0][0] == truss.member_marks[int(stresses.argmax())] and len(listed.rows) == 20

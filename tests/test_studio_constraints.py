@@ -9,7 +9,7 @@ from scantruss.front.orientation_field import STARTS_OF_EFFORTS, lattice_along, 
 from scantruss.studio.drawn_lines import ScannedPoints, numbers_of, points_of
 from scantruss.studio.frame import DRAWN_EXTENT, SceneFrame
 from scantruss.studio.length_brush import MOST_PAINTED, painted, places_to_paint
-from scantruss.studio.symmetry_tool import corners_of
+from scantruss.studio.symmetry_tool import corners_of, ends_on, upright_plane
 from scantruss.surface.samples import sample_surface
 
 HEIGHT = 6.0
@@ -111,3 +111,20 @@ def test_a_mirror_plane_is_drawn_where_it_is(dome: st.PointCloud) -> None:
     corners = corners_of(frame, np.array([4.5e5, 5.3e6, 2.0, 1.0, 2.0, 0.0]))
     places = frame.from_scene(corners) - [4.5e5, 5.3e6, 2.0]
     assert np.abs(places @ normal).max() < 1e-5 and np.ptp(corners, axis=0).max() < 1.3 * DRAWN_EXTENT
+
+
+def test_a_mirror_plane_is_dragged_by_its_ends_on_the_scan(dome: st.PointCloud) -> None:
+    """The plane stands upright through both places; its ends are where it leaves the scan, on the plane."""
+    middle = np.array([4.5e5, 5.3e6, 0.0])
+    begin, end = middle + [-3.0, -4.0, 3.3], middle + [3.0, 4.0, 3.3]
+    plane = np.array(upright_plane(begin, end))
+    assert plane[5] == 0.0 and np.linalg.norm(plane[3:]) == pytest.approx(1.0)
+    assert np.abs((np.stack([begin, end, middle]) - plane[:3]) @ plane[3:]).max() < 1e-2
+    ends = ends_on(ScannedPoints.of(dome, SETTINGS).places, plane, 1.0)
+    assert ends is not None and np.abs((ends - plane[:3]) @ plane[3:]).max() < 1e-6
+    assert np.linalg.norm(ends[1] - ends[0]) == pytest.approx(2 * HEIGHT, rel=0.02)
+    moved = upright_plane(ends[0], ends[1])
+    assert abs(np.dot(moved[3:], plane[3:])) == pytest.approx(1.0, abs=1e-6)
+    assert ends_on(ScannedPoints.of(dome, SETTINGS).places, np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0]), 1.0) is None
+    with pytest.raises(st.InputError, match="above each other"):
+        upright_plane(middle, middle + [0.0, 0.0, 2.0])

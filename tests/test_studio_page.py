@@ -228,8 +228,12 @@ def test_a_person_makes_a_grid_and_a_structure(served: tuple[str, Session], tmp_
         page.focus("[role=slider]:visible")
         page.keyboard.press("ArrowRight")
         page.wait_for_selector("text=(quick, not saved)")
-        page.click("button:has-text('Generate')")
+        length = float(f"{1.1 * session.settings.length:.3g}")
+        field(page, "exactly").fill(f"{length:g}")
+        page.click("button:has-text('Generate')")  # at once: what was typed counts
         page.wait_for_selector("text=(quick, not saved)", state="detached")
+        assert session.grid is not None and session.grid.settings is not None
+        assert session.settings.length == session.grid.settings.length == length
         page.wait_for_selector("text=certificate: passed")
         assert page.evaluate(FAINT) == []
         tab(page, "Constraints")

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from e57_file import Column
 from scan_files import axes, e57, pcd
+from scipy.spatial.transform import Rotation
 
 import scantruss as st
 from scantruss.scan.formats.own_colors import own_colors
@@ -14,7 +15,7 @@ from scantruss.scan.formats.reading import read_points
 from scantruss.studio.browsers import Browsers
 from scantruss.studio.colours import CLASSES, OWN_COLORS, colorings_of_scan, colors_of, colors_of_scan, rgb_of
 from scantruss.studio.outputs import TAKEN, command_of, settings_files
-from scantruss.studio.pictures import facing, over
+from scantruss.studio.pictures import about_z, angle_to_see, facing, over
 from scantruss.studio.project import save_project
 from scantruss.studio.remove_tool import seen_within
 from scantruss.studio.scene import BARB_WIDTH, barbed, spread
@@ -252,3 +253,18 @@ def test_a_scale_with_given_ends_and_colours_beyond_it() -> None:
     colors, low, high = colors_of(values, None, (0.2, 1.0))
     assert (low, high) == (0.2, 1.0) and np.array_equal(colors[2], colors[3])
     assert rgb_of("#d81e2c") == (216, 30, 44)
+
+
+def test_a_turntable_shows_all_of_the_scan_and_little_more() -> None:
+    rng = np.random.default_rng(4)
+    points = rng.uniform(-1, 1, (500, 3)) * [5.0, 3.0, 1.5]
+    target, aspect = np.zeros(3), 16 / 9
+    places = np.array([about_z(turn) @ [8.0, -14.0, 9.0] for turn in np.linspace(0, 2 * np.pi, 36, endpoint=False)])
+    half = np.tan(angle_to_see(points, places, target, aspect) / 2)
+    most = []
+    for place in places:
+        w, x, y, z = facing(place, target)
+        seen = (points - place) @ Rotation.from_quat([x, y, z, w]).as_matrix()  # x right, y down, z ahead
+        most.append((np.abs(seen[:, :2]) / seen[:, 2:] / [half * aspect, half]).max())
+    assert max(most) == pytest.approx(1 / 1.1, rel=1e-6)
+    assert angle_to_see(points, np.array([[0.5, 0.0, 0.0]]), target, aspect) == np.pi

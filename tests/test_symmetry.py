@@ -10,7 +10,7 @@ from scipy.spatial import cKDTree
 import scantruss as st
 from scantruss.cli.main import main
 from scantruss.errors import FrontError, InputError
-from scantruss.scan.symmetry import check_mirror_planes, find_mirror_planes
+from scantruss.scan.symmetry import check_mirror_planes, find_mirror_planes, nearest_mirror_plane
 
 LENGTH = 12.0  # of members of the vault, 100 long
 
@@ -50,6 +50,19 @@ def test_a_crown_that_leans_leaves_one_plane_and_a_given_one_is_checked() -> Non
         check_mirror_planes(points, [(500, -200, 0, 1, 0, 0)], 0.5)
     with pytest.raises(InputError, match="meet in one line at equal angles"):
         check_mirror_planes(vault(), [(500, -200, 0, 0, 1, 0), (500, -200, 0, 1, 0.3, 0)], 50.0)
+
+
+@pytest.mark.parametrize(("turn", "aside"), [(8.0, 0.0), (-12.0, 4.0), (0.0, 6.0)])
+def test_a_plane_drawn_by_hand_means_the_mirror_plane_near_it(turn: float, aside: float) -> None:
+    angle = np.radians(turn)
+    meant = nearest_mirror_plane(vault(), (500.0 + aside, -200.0, 10.0, np.cos(angle), np.sin(angle), 0.0), 0.5)
+    assert meant is not None and np.abs(np.array(meant.normal) - [1, 0, 0]).max() < 1e-3
+    assert np.dot(np.subtract([500, -200, 10], meant.point), meant.normal) == pytest.approx(0, abs=0.02)
+
+
+def test_a_plane_drawn_where_there_is_no_symmetry_means_none() -> None:
+    aside = np.radians(40.0)
+    assert nearest_mirror_plane(vault(), (500.0, -200.0, 10.0, np.cos(aside), np.sin(aside), 0.0), 0.5) is None
 
 
 def test_a_scan_without_a_mirror_plane_is_refused() -> None:

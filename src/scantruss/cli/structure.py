@@ -186,7 +186,8 @@ def _encoded(
     out: Path, values: Namespace, settings: StructureSettings, solution: Solution, report: StructureReport
 ) -> bytes:
     """Return what a report or a picture of the structure holds."""
-    from ..report.structural.contents import ReportSource, overview_picture, report_parts
+    from ..report.structural.contents import overview_picture, report_parts
+    from ..report.structural.source import ReportSource
 
     if out.suffix.lower() == ".png":
         from ..export.drawing.structure import encode_structure_picture

@@ -108,7 +108,7 @@ def build_solid(
     nodes = np.asarray(grid.nodes[used], np.float64) * scale
     bars = bars_of(nodes, edges, member_diameter / 2, sides)
     if marks:
-        bars = marked_bars(grid, nodes, edges, bars, member_diameter / 2, node_diameter / 2, sides)
+        bars = marked_bars(grid, nodes, edges, bars, member_diameter / 2, (node_diameter / 2,) * 2, sides)
     parts = [*balls_of(grid, used, nodes, node_diameter / 2, sides, marks), *bars]
     order = _curve_order(np.concatenate([nodes, nodes[edges].mean(axis=1)]))
     pieces = _count_pieces(len(nodes), edges)
@@ -177,7 +177,7 @@ def balls_of(
     ball = Manifold.sphere(radius, max(sides, MARKED_SIDES) if marks else sides)
     if not marks:
         return [ball.translate(tuple(node)) for node in nodes.tolist()]
-    names, normals = node_marks(grid), _normals(grid)
+    names, normals = node_marks(grid), outer_normals(grid)
     return [
         engraved(ball, radius, names[k], normals[k]).translate(tuple(node))
         for k, node in zip(ids.tolist(), nodes.tolist(), strict=True)
@@ -185,18 +185,28 @@ def balls_of(
 
 
 def marked_bars(
-    grid: Grid, nodes: np.ndarray, edges: np.ndarray, bars: list[Any], radius: float, ball: float, sides: int
+    grid: Grid,
+    nodes: np.ndarray,
+    edges: np.ndarray,
+    bars: list[Any],
+    radius: float,
+    taken: tuple[float, float],
+    sides: int,
 ) -> list[Any]:
-    """Return the members (E, 2) with their marks engraved outside, in the middle between the balls; nodes of the solid."""
-    names, normals = member_marks(grid), _normals(grid)[grid.edges].sum(axis=1)
+    """Return the members, or parts of them (E, 2), with their marks engraved outside; nodes of the solid.
+
+    The marks stand in the middle of what is free: `taken` is what balls and joints take at the first end and at the second.
+    """
+    names, normals = member_marks(grid), outer_normals(grid)[grid.edges].sum(axis=1)
     made = []
     for name, normal, bar, (a, b) in zip(names, normals, bars, nodes[edges], strict=True):
         length = float(np.linalg.norm(b - a))
-        made.append(engraved_member(bar, radius, sides, name, (a + b) / 2, (b - a) / length, normal, length - 2 * ball))
+        way, room = (b - a) / length, length - sum(taken)
+        made.append(engraved_member(bar, radius, sides, name, a + way * (taken[0] + room / 2), way, normal, room))
     return made
 
 
-def _normals(grid: Grid) -> np.ndarray:
+def outer_normals(grid: Grid) -> np.ndarray:
     """Return the unit normal of each node (V, 3); up where it has none."""
     if isinstance(grid, LayeredGrid):
         return grid.own_normals

@@ -21,6 +21,7 @@ PLACES_TRIED = 300  #: places with which a plane is tried first
 TURN_STEP = 2.0  #: between the directions tried about each principal axis [degree]
 PLANES_REFINED = 8  #: planes that are refined
 PLANES_APART = 5.0  #: of two planes [degree]
+DRAWN_TURN = 20.0  #: of a plane drawn by hand to the mirror plane that it means [degree]
 PLANE_STEPS = 10  #: Gauss-Newton steps of a plane
 NEAR_CELLS = 2.5  #: cells beyond which a reflected place has no counterpart
 IMAGE_QUANTILE = 0.95  #: of the places, which the misfit holds for
@@ -118,6 +119,27 @@ def check_mirror_planes(
     if len(planes) > 1 and _axis_of(normals) is None:
         raise InputError("several mirror planes must meet in one line at equal angles, such as two that are square")
     return tuple(planes)
+
+
+def nearest_mirror_plane(points: np.ndarray, row: Sequence[float], tolerance: float) -> MirrorPlane | None:
+    """Return the mirror plane of a scan that a plane drawn by hand means: turned by no more than `DRAWN_TURN`; None where there is none.
+
+    Parameters
+    ----------
+    points : (N, 3) float64 [scan unit]
+    row : six numbers
+        A point of the drawn plane and its normal.
+    tolerance : float
+        Within which 95 % of the scan must lie from its mirror image [scan unit].
+    """
+    places = _places(points)
+    normal = _oriented(np.array(row[3:], float) / np.linalg.norm(row[3:]))
+    drawn = float((np.array(row[:3], float) - places.origin) @ normal)
+    for offset in (drawn, 0.0):  # mirror planes pass through the middle, where the points lie evenly
+        turned, at, misfit = _refined(places, normal, offset)
+        if misfit <= tolerance and abs(float(turned @ normal)) >= math.cos(math.radians(DRAWN_TURN)):
+            return _plane(places, turned, at, misfit)
+    return None
 
 
 def _places(points: np.ndarray) -> _Places:

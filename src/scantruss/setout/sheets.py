@@ -25,7 +25,11 @@ LAYERS = (
     HEIGHT_LINES,
     GROUND_LINES,
 )
-BELOW, ROOM = 5.2, 20.0  # where heights are written, and room between rows, over the height of words
+BELOW, ROOM = 6.4, 22.0  # where heights are written, and room between rows, over the height of words
+BESIDE, LEADER = (
+    1.3,
+    1.2,
+)  # distance of words beside each other, and length of lines that lead to them, over the height of words
 WORD = 0.11  # height of marks over the median length of members, as they are seen in plan
 
 
@@ -110,12 +114,29 @@ def _section(made: SettingOut, number: int, height: float) -> Sheet:
     lines = [(MEMBER_LINES, segment[:, flat]) for segment in line.segments]
     lines.append((GROUND_LINES, np.array([(line.flat[0, 0], ground), (line.flat[-1, 0], ground)])))
     words = []
-    for (x, z), node, member in zip(line.flat.tolist(), line.nodes.tolist(), line.members.tolist(), strict=True):
+    beside = _apart(line.flat[:, 0], BESIDE * height).tolist()
+    for (x, z), aside, node, member in zip(
+        line.flat.tolist(), beside, line.nodes.tolist(), line.members.tolist(), strict=True
+    ):
         lines.append((HEIGHT_LINES, np.array([(x, ground), (x, z)])))
+        lines.append((HEIGHT_LINES, np.array([(x, ground), (aside, ground - LEADER * height)])))
+        lines.append((MEMBER_LINES, np.array([(x, z), (aside, z + 0.4 * LEADER * height)])))
         mark = made.node_marks[node] if node >= 0 else made.member_marks[member]
-        words.append(Words(NODE_MARKS if node >= 0 else MEMBER_MARKS, mark, (x, z + 2.2 * height), 90.0))
-        words.append(Words(HEIGHT_LINES, f"{x:.0f} / {z:.0f}", (x, ground - BELOW * height), 90.0))
+        words.append(Words(NODE_MARKS if node >= 0 else MEMBER_MARKS, mark, (aside, z + 2.4 * height), 90.0))
+        words.append(Words(HEIGHT_LINES, f"{x:.0f} / {z:.0f}", (aside, ground - BELOW * height), 90.0))
     return Sheet(f"Section {line.name}", _with_room(lines, height), words, height)
+
+
+def _apart(places: np.ndarray, gap: float) -> np.ndarray:
+    """Return places (K,) in their order, moved as little as can be so that they are a gap apart: isotonic regression."""
+    groups: list[tuple[float, int]] = []  # mean and number of places that are moved together, their gaps taken off
+    for place in (places - gap * np.arange(len(places))).tolist():
+        mean, count = place, 1
+        while groups and groups[-1][0] > mean:  # each turn takes a group away
+            other, more = groups.pop()
+            mean, count = (mean * count + other * more) / (count + more), count + more
+        groups.append((mean, count))
+    return np.repeat([mean for mean, _ in groups], [count for _, count in groups]) + gap * np.arange(len(places))
 
 
 def _unrolled(made: SettingOut, number: int, height: float) -> Sheet:

@@ -17,7 +17,7 @@ MOST_NAMED = 4  #: nodes of a mechanism that are named
 INVERSE_STEPS = 6  #: of inverse iteration, which converges in two where an eigenvalue is nil
 
 
-def softest_motion(stiffness: csc_matrix, factor: SuperLU) -> tuple[float, np.ndarray]:
+def softest_motion(stiffness: csc_matrix, factor: SuperLU, stiff: float = math.inf) -> tuple[float, np.ndarray]:
     """Return the smallest eigenvalue of a stiffness matrix, or one little above it, with its motion: inverse iteration.
 
     Parameters
@@ -26,11 +26,16 @@ def softest_motion(stiffness: csc_matrix, factor: SuperLU) -> tuple[float, np.nd
         Symmetric, not negative, diagonal 1.
     factor : SuperLU
         Of that matrix, or of one shifted a little.
+    stiff : float
+        Eigenvalue that matters no more: once all are seen to be larger the value is only some larger one.
     """
     motion = np.random.default_rng(1).standard_normal(stiffness.shape[0])
-    for _ in range(INVERSE_STEPS):
+    for step in range(INVERSE_STEPS):
         motion /= math.sqrt(product(motion, motion))
         found = factor.solve(motion)
+        if step > 0 and product(found, found) < 1 / stiff**2:  # the first step has brought a nil motion forward
+            motion = found
+            break
         if not np.isfinite(found).all() or not found.any():
             break
         motion = found

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from scipy.linalg import eigh
@@ -17,13 +16,14 @@ from scipy.sparse.linalg import LinearOperator, SuperLU, eigsh, splu
 
 from ..errors import InputError
 from .frame import BEND_Y1, BEND_Z1, BOW, LENGTHEN, assemble, freedoms, inner_turns, member_freedoms, transforms
+from .lanczos import largest_eigenpairs
 from .mechanism import pivots, product
 from .statics import IN_ORDER, CaseResult, Factored, Solution
 from .truss import GRAVITY, Truss
 
 FEW_FREEDOMS = 200  #: up to which all modes are found at once by dense matrices
 SEVERAL_LEADING = 3  #: combinations of which buckling is looked at, with different leading actions
-ROUGH = 1e-2  #: relative error of the first estimate
+ROUGH, EXACT = 3e-2, 1e-9  #: what is left of an eigenvector, for the first estimate and in the end
 #: shares of the first value about which the others are looked for, until none lies before
 MODE_SHIFTS = (0.97, 0.8, 0.5)
 NEGLIGIBLE = 1e-9  #: share of the largest eigenvalue below which one is nil
@@ -130,11 +130,10 @@ def _geometric(truss: Truss, axial: np.ndarray) -> np.ndarray:
 
 def _of_many(part: csc_matrix, stiff: csc_matrix, factor: SuperLU, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Return `count` largest eigenvalues of `part` x = mu `stiff` x (K,) with their vectors (F, K), or one that is not positive."""
-    given: dict[str, Any] = {"M": stiff, "v0": np.random.default_rng(1).standard_normal(stiff.shape[0])}
-    given["Minv"] = LinearOperator(stiff.shape, matvec=factor.solve, dtype=float)
-    first, vectors = eigsh(part, k=1, which="LA", tol=ROUGH, **given)
-    usual = factor.solve(part @ given["v0"])
-    if first[0] ** 2 * product(given["v0"], given["v0"]) <= NEGLIGIBLE**2 * product(usual, usual) or first[0] < 0:
+    first, vectors = _of_factor(part, stiff, factor, 1, ROUGH)
+    usual = np.random.default_rng(1).standard_normal(stiff.shape[0])
+    made = factor.solve(part @ usual)
+    if first[0] ** 2 * product(usual, usual) <= NEGLIGIBLE**2 * product(made, made) or first[0] < 0:
         return first, vectors
     for share in MODE_SHIFTS:
         shift = share / float(first[0])
@@ -143,12 +142,22 @@ def _of_many(part: csc_matrix, stiff: csc_matrix, factor: SuperLU, count: int) -
         except RuntimeError:  # an eigenvalue lies there
             continue
         if (moved.perm_r == moved.perm_c).all() and (pivots(moved) > 0).all():  # none lies before
-            near = LinearOperator(stiff.shape, matvec=moved.solve, dtype=float)
-            about = {"sigma": shift, "OPinv": near, "mode": "buckling", "which": "LA", "v0": given["v0"]}
-            factors, vectors = eigsh(stiff, k=count, M=part, tol=1e-10, **about)
-            return 1 / factors, vectors
-    values, vectors = eigsh(part, k=count, which="LA", tol=1e-10, **given)
-    return values, vectors
+            near = largest_eigenpairs(moved, stiff, stiff, count, EXACT)
+            if near is not None:
+                return (near[0] - 1) / (shift * near[0]), near[1]  # near: factors over what they are beyond the shift
+    return _of_factor(part, stiff, factor, count, EXACT)
+
+
+def _of_factor(
+    part: csc_matrix, stiff: csc_matrix, factor: SuperLU, count: int, tolerance: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return `count` largest eigenpairs of the factored matrix alone, by ARPACK where they lie too close together."""
+    found = largest_eigenpairs(factor, part, stiff, count, tolerance, block=min(count, 2))
+    if found is None:
+        start = np.random.default_rng(1).standard_normal(stiff.shape[0])
+        solver = LinearOperator(stiff.shape, matvec=factor.solve, dtype=float)
+        found = eigsh(part, k=count, M=stiff, Minv=solver, which="LA", tol=tolerance, v0=start)
+    return found
 
 
 def _largest(factored: Factored, matrix: csc_matrix, count: int) -> tuple[np.ndarray, np.ndarray]:

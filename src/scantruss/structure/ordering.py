@@ -3,34 +3,61 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_matrix, csr_matrix
 
 from .truss import Truss
 
-LEAST_PART = 12  #: nodes that are not divided further
+LEAST_PART = 4  #: nodes that are not divided further
 
 
 def dissected(truss: Truss) -> np.ndarray:
-    """Return the rank (V,) of each node: halves by their longest side first, then the nodes between them, and so on in each half."""
+    """Return the rank (V,) of each node: halves by their longest side first, then the nodes between them, and so on in each half.
+
+    All parts of one depth are divided at once.
+    """
     count = len(truss.nodes)
-    ends = np.concatenate([truss.members, truss.members[:, ::-1]])
-    near = csr_matrix(coo_matrix((np.ones(len(ends)), tuple(ends.T)), (count, count)))
-    here = np.zeros(count)
     rank = np.empty(count, np.int64)
-    parts = [(np.arange(count), count)]  # nodes, and the rank after their last
-    while parts:  # each turn takes a part away and adds smaller ones
-        nodes, end = parts.pop()
-        places = truss.nodes[nodes]
-        axis = int(np.ptp(places, axis=0).argmax()) if len(nodes) else 0
-        order = np.argsort(places[:, axis], kind="stable")
-        one, other = nodes[order[: len(nodes) // 2]], nodes[order[len(nodes) // 2 :]]
-        here[one] = 1.0
-        between = near[other] @ here > 0
-        here[one] = 0.0
-        if len(nodes) <= LEAST_PART or between.all():
-            rank[nodes] = np.arange(end - len(nodes), end)
-            continue
-        last, rest = other[between], other[~between]
-        rank[last] = np.arange(end - len(last), end)
-        parts += [(one, end - len(last) - len(rest)), (rest, end - len(last))]
+    part = np.zeros(count, np.int64)  # of each node that has no rank yet
+    end = np.array([count])  # the rank after the last one of each part
+    left = np.arange(count)  # nodes without a rank
+    members = truss.members
+    while len(left):  # ends: a part gives its nodes ranks, or is divided into smaller ones
+        order, first, size = _along_longest_sides(truss.nodes[left], part[left], len(end))
+        left = left[order]
+        mine = part[left]
+        late = np.zeros(count, bool)
+        late[left] = np.arange(len(left)) - first[mine] >= size[mine] // 2
+        members = members[part[members[:, 0]] == part[members[:, 1]]]
+        crossing = members[late[members[:, 0]] != late[members[:, 1]]]
+        between = np.zeros(count, bool)
+        between[crossing] = True
+        between &= late
+        last = np.bincount(mine, between[left], len(end)).astype(np.int64)
+        whole = (size <= LEAST_PART) | (last == size - size // 2)
+        done = whole[mine] | between[left]
+        sizes = np.where(whole, size, last)
+        rank[left[done]] = (end - sizes)[mine[done]] + _numbers_within(mine[done])
+        inside = np.zeros(count, bool)
+        inside[left[~done]] = True
+        members = members[inside[members].all(axis=1)]
+        left, mine = left[~done], mine[~done]
+        fresh = 2 * mine + ~late[left]  # the later half is eliminated first, so that its ranks stand before
+        ends = np.stack([end - last - (size // 2), end - last], axis=1).ravel()
+        kept, part[left] = np.unique(fresh, return_inverse=True)
+        end = ends[kept]
     return rank
+
+
+def _along_longest_sides(places: np.ndarray, part: np.ndarray, parts: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return an order of the nodes (N,) by their parts, within each along its longest side, and the first and the number of each part."""
+    size = np.bincount(part, minlength=parts)
+    first = np.cumsum(size) - size
+    by_part = np.argsort(part, kind="stable")
+    sides = np.maximum.reduceat(places[by_part], first) - np.minimum.reduceat(places[by_part], first)
+    along = places[np.arange(len(part)), sides.argmax(axis=1)[part]]
+    return np.lexsort((along, part)), first, size
+
+
+def _numbers_within(part: np.ndarray) -> np.ndarray:
+    """Return the number of each node within its part; parts stand together."""
+    starts = np.flatnonzero(np.r_[True, part[1:] != part[:-1]]) if len(part) else np.zeros(0, np.int64)
+    return np.arange(len(part)) - np.repeat(starts, np.diff(np.r_[starts, len(part)]))

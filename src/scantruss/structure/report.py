@@ -239,8 +239,8 @@ def _limits(truss: Truss, figures: Sequence[CaseFigures], checks: MemberChecks) 
     return said
 
 
-def structure_lines(report: StructureReport, *, most: int = 12) -> list[tuple[str, ...]]:
-    """Return rows of a table: each load case, then the worst combinations; see `STRUCTURE_HEAD`."""
+def chosen_cases(report: StructureReport, most: int = 12) -> list[CaseFigures]:
+    """Return each load case, then the combinations that use the members or move the nodes most."""
     cases = [case for case in report.cases if case.state == "case"]
     others = [case for case in report.cases if case.state != "case"]
     others.sort(key=lambda case: (case.state != "ULS", -(case.utilization_max or 0.0), -case.displacement_max))
@@ -248,6 +248,11 @@ def structure_lines(report: StructureReport, *, most: int = 12) -> list[tuple[st
     chosen += sorted((case for case in others if case.state == "SLS"), key=lambda case: -case.displacement_max)[
         : max(most // 12, 1)
     ]
+    return cases + chosen
+
+
+def structure_lines(report: StructureReport) -> list[tuple[str, ...]]:
+    """Return rows of a table of `chosen_cases`; see `STRUCTURE_HEAD`."""
     return [
         (
             case.name,
@@ -258,7 +263,7 @@ def structure_lines(report: StructureReport, *, most: int = 12) -> list[tuple[st
             words_of_number(case.force_max / 1e3, 4),
             use_words(case.utilization_max),
         )
-        for case in cases + chosen
+        for case in chosen_cases(report)
     ]
 
 

@@ -22,11 +22,15 @@ from .frame import (
     stiffness_matrix,
     transforms,
 )
-from .mechanism import pivots, refuse_mechanism, softest_motion
+from .mechanism import product, refuse_mechanism, softest_motion
 from .ordering import dissected
 from .truss import GRAVITY, LoadCase, Truss
 
 SINGULAR = 1e-12  #: smallest eigenvalue of the stiffness, its diagonal scaled to 1, at which a structure is a mechanism
+NEARLY_SINGULAR = 10 * SINGULAR  #: below which it is looked at again
+STIFF = 1e-8  #: smallest eigenvalue that is no mechanism, whatever it is exactly
+REFINED = 1e-11  #: share of the greatest load that a solution may leave
+UNSOLVED = 1e-3  #: share of a load that a factor leaves where it is none
 STATIONS = 9  #: places along a member, both ends included, at which forces are given
 ORDERING = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
 IN_ORDER = {**ORDERING, "permc_spec": "NATURAL"}  #: of displacements that are in a good order already
@@ -188,12 +192,16 @@ class Factored:
     factor: SuperLU | None  #: of the scaled stiffness of the free displacements; None where all is held
 
     def solve(self, loads: np.ndarray) -> np.ndarray:
-        """Return the (F, C) free displacements of loads, refined once."""
+        """Return the (F, C) free displacements of loads, refined once where they leave more than `REFINED` of the greatest load."""
         if self.factor is None:
             return loads
         part = self.stiffness[self.free][:, self.free]
         found = self._once(loads)
-        return found + self._once(loads - part @ found)
+        left = loads - part @ found
+        rough = np.abs(left).max(axis=0) > REFINED * np.abs(loads).max(axis=0)
+        if rough.any():
+            found[:, rough] += self._once(left[:, rough])
+        return found
 
     def _once(self, loads: np.ndarray) -> np.ndarray:
         assert self.factor is not None
@@ -220,14 +228,11 @@ def factor_stiffness(truss: Truss) -> Factored:
     root = np.sqrt(np.where(diagonal > 1e-14 * diagonal.max(), diagonal, diagonal.max()))
     scale = diags(1.0 / root)
     scaled = (scale @ part @ scale).tocsc()
-    try:
-        factor = splu(scaled, **IN_ORDER)
-        small = float(np.abs(pivots(factor)).min()) < SINGULAR
-    except RuntimeError:  # a pivot is nil
-        factor, small = None, True
-    if small:
+    factor = _factor_of(scaled)
+    value, motion = (0.0, root) if factor is None else softest_motion(scaled, factor, STIFF)
+    if small := value < NEARLY_SINGULAR:  # the factor of a matrix that is nearly singular is not to be trusted
         factor = splu((scaled + SINGULAR / 10 * identity(len(free))).tocsc(), **IN_ORDER)
-    value, motion = softest_motion(scaled, factor)
+        value, motion = softest_motion(scaled, factor)
     if value < SINGULAR:
         everywhere = np.zeros(stiffness.shape[0])
         everywhere[free] = motion / root
@@ -235,6 +240,17 @@ def factor_stiffness(truss: Truss) -> Factored:
     if small:
         factor = splu(scaled, permc_spec="COLAMD")
     return Factored(truss, stiffness, free, root, factor)
+
+
+def _factor_of(matrix: csc_matrix) -> SuperLU | None:
+    """Return the factor of a matrix; None where a pivot is nil, or where it does not solve."""
+    try:
+        factor = splu(matrix, **IN_ORDER)
+    except RuntimeError:
+        return None
+    loads = np.random.default_rng(2).standard_normal(matrix.shape[0])
+    left = matrix @ factor.solve(loads) - loads
+    return factor if product(left, left) < UNSOLVED**2 * product(loads, loads) else None  # not a number is not less
 
 
 def check_whole(truss: Truss) -> None:
@@ -283,15 +299,13 @@ def solve(truss: Truss, factored: Factored | None = None) -> Solution:
     moved = np.stack([_settled(case, count, len(truss.nodes)) for case in truss.cases], axis=1)
     moved[made.free] = made.solve((loads - made.stiffness @ moved)[made.free])
     forces = made.stiffness @ moved - loads
+    held = np.isinf(truss.supports[:, :count]).ravel()
+    springs = np.where(np.isinf(truss.supports), 0.0, truss.supports)[:, :count].ravel()
     results = []
     for number, case in enumerate(truss.cases):
         ends = moved[rows, number]
         natural = np.einsum("mij,mj->mi", stiff, np.einsum("mij,mj->mi", change, ends)) + parts[number][1]
-        reactions = np.zeros(total)
-        held = np.setdiff1d(np.arange(total), made.free)
-        reactions[held] = forces[held, number]
-        springs = np.where(np.isinf(truss.supports), 0.0, truss.supports)[:, :count].ravel()
-        reactions -= springs * moved[:, number]
+        reactions = np.where(held, forces[:, number], 0.0) - springs * moved[:, number]
         results.append(
             CaseResult(
                 name=case.name,

@@ -16,7 +16,8 @@ from ..surface.samples import sample_surface
 if TYPE_CHECKING:
     from .state import StudioState
 
-RISING = np.array([(68, 1, 84), (59, 82, 139), (33, 145, 140), (94, 201, 98), (230, 226, 106)], float)
+#: light enough to be seen on a dark page (3 to 1 on its background), dark enough on a light one, and rising in lightness
+RISING = np.array([(126, 87, 194), (74, 117, 190), (33, 145, 140), (94, 190, 88), (214, 196, 60)], float)
 DIVERGING = np.array([(178, 24, 43), (239, 138, 98), (200, 200, 200), (103, 169, 207), (33, 102, 172)], float)
 PLAIN = np.array([60, 90, 110], np.uint8)
 DIMMED = np.array([215, 218, 220], np.uint8)

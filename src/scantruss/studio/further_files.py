@@ -62,9 +62,10 @@ def _schedules(state: StudioState) -> dict[str, bytes]:
 def _structure_report(state: StudioState, suffix: str) -> dict[str, bytes]:
     from ..export.page import encode_page
     from ..export.style import FileStyle
-    from ..report.structural.contents import ReportSource, report_parts
+    from ..report.structural.contents import report_parts
     from ..report.structural.html import encode_html
     from ..report.structural.pdf import encode_pdf
+    from ..report.structural.source import ReportSource
 
     model = model_to_show(state, STRUCTURE)
     assert state.solution is not None and state.report is not None

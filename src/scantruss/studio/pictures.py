@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 LARGE_PICTURE = (2160, 3840)  #: height and width of a picture [pixel]
 TURN_SIZE = (540, 960)  #: height and width of a turntable [pixel]
 TURN_FRAMES, TURN_MILLISECONDS = 36, 100  #: of a turntable, and how long each is shown
+TURNED_POINTS, ROOM_AROUND = 5_000, 1.1  #: points that a turntable must show, and what it shows over what it must
 PICTURE_PATIENCE = 120.0  #: how long the browser may take for a picture [s]
 BEHIND_PICTURE = {False: (255, 255, 255), True: (20, 20, 20)}  #: behind a picture of a light and a dark page
 
@@ -36,14 +37,14 @@ class PictureTool:
         if self.view.session.cloud is None:
             raise InputError("there is no scan yet; open one")
         self.view.say(f"taking {TURN_FRAMES} pictures; keep the page in front")
-        camera = self.view.client.camera
+        camera, cloud = self.view.client.camera, self.view.session.cloud
         position, target = np.array(camera.position), np.array(camera.look_at)
-        frames = []
-        for k in range(TURN_FRAMES):
-            turn = 2 * np.pi * k / TURN_FRAMES
-            around = np.array([[np.cos(turn), -np.sin(turn), 0], [np.sin(turn), np.cos(turn), 0], [0, 0, 1]])
-            place = target + around @ (position - target)
-            frames.append(self._shot(*TURN_SIZE, wxyz=facing(place, target), position=tuple(place), fov=camera.fov))
+        turns = [2 * np.pi * k / TURN_FRAMES for k in range(TURN_FRAMES)]
+        places = np.array([target + about_z(turn) @ (position - target) for turn in turns])
+        every = max(1, len(cloud.points) // TURNED_POINTS)
+        drawn = self.view.frame.to_scene(np.asarray(cloud.points[::every]) + cloud.origin)
+        fov = min(float(camera.fov), angle_to_see(drawn, places, target, TURN_SIZE[1] / TURN_SIZE[0]))
+        frames = [self._shot(*TURN_SIZE, wxyz=facing(at, target), position=tuple(at), fov=fov) for at in places]
         self._send("turntable.gif", frames, "GIF")
 
     def _shot(self, height: int, width: int, **camera: Any) -> np.ndarray:
@@ -77,6 +78,33 @@ def over(pixels: np.ndarray, behind: np.ndarray) -> np.ndarray:
     share = pixels[:, :, 3:].astype(np.float32) / 255.0
     mixed = share * pixels[:, :, :3] + (1.0 - share) * behind
     return np.ascontiguousarray(np.rint(mixed).astype(np.uint8))
+
+
+def about_z(turn: float) -> np.ndarray:
+    """Return the (3, 3) rotation about z by an angle [rad]."""
+    return np.array([[np.cos(turn), -np.sin(turn), 0.0], [np.sin(turn), np.cos(turn), 0.0], [0.0, 0.0, 1.0]])
+
+
+def angle_to_see(points: np.ndarray, places: np.ndarray, target: np.ndarray, aspect: float) -> float:
+    """Return the least upright angle of view [rad] in which cameras at some places (C, 3) see all points (N, 3), with some room.
+
+    Parameters
+    ----------
+    target : (3,)
+        What all cameras look at, upright.
+    aspect : float
+        Width over height of the picture.
+    """
+    needed = 0.0
+    for place in places:
+        ahead = (target - place) / np.linalg.norm(target - place)
+        right = np.cross(ahead, [0.0, 0.0, 1.0])
+        right = right / (np.linalg.norm(right) or 1.0)
+        seen = (points - place) @ np.stack([right, np.cross(ahead, right), ahead]).T
+        if seen[:, 2].min() <= 0:  # it stands among them
+            return float(np.pi)
+        needed = max(needed, float((np.abs(seen[:, :2]) / (seen[:, 2:] * [aspect, 1.0])).max()))
+    return 2.0 * float(np.arctan(ROOM_AROUND * needed))
 
 
 def facing(place: np.ndarray, target: np.ndarray) -> tuple[float, float, float, float]:

@@ -59,6 +59,7 @@ class RowsTool:
             self.view.scene.points("/rows", at, np.array(ROWS_COLOR, np.uint8), 0.12)
             return
         begin, self._begin = self._begin, None
+        self.view.click.value = self.view.clicks[0]
         self._set(begin, scanned[found])
 
     def _set(self, begin: np.ndarray, end: np.ndarray) -> None:

@@ -48,6 +48,10 @@ def solved_state(state: StudioState, progress: Progress = _silent) -> StudioStat
     if state.grid is None:
         raise InputError("there is no grid yet; press Generate")
     asked = state.structure_settings
+    if not (state.grid.unit or asked.unit):
+        raise InputError(
+            "the unit of the scan is not known, and a structure needs lengths in metres; choose it on the tab Scan"
+        )
     truss = Truss.from_grid(state.grid, **truss_arguments(asked))
     rounds: list[SizingRound] = []
     weights = None

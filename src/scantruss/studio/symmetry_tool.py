@@ -1,19 +1,29 @@
-"""Symmetry: mirror planes that the grid keeps exactly, found in the scan or typed."""
+"""Symmetry: mirror planes that the grid keeps exactly, found in the scan, drawn, dragged or typed."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .drawn_lines import numbers_of
+from ..errors import InputError
+from ..scan.symmetry import SYMMETRY_TOLERANCE, nearest_mirror_plane
+from .dragging import DraggedBalls
+from .drawn_lines import ScannedPoints, numbers_of
 from .frame import DRAWN_EXTENT, SceneFrame
+from .picking import nearest_point
 
 if TYPE_CHECKING:
     from .state import StudioState
     from .view import StudioView
 
+PLANE_MODE = "mirror plane"
 PLANE_COLOR = (90, 120, 200)
+PLANE_RADIUS = 0.12  #: of the balls by which a plane is dragged [scene]
+LEANING = 0.1  #: greatest z of the normal of a plane that is dragged
+ABOVE = 1e-6  #: share of their distance that two places are apart in plan where they lie above each other
 PLANE_REACH = 0.6  #: of a plane that is drawn, from its middle [extent of the scan]
 SYMMETRIES = ("none", "auto", "typed")
 
@@ -29,7 +39,16 @@ class SymmetryTool:
         self.words = gui.add_text(
             "plane", "", hint="x, y, z, nx, ny, nz: a point and a normal, in the frame of the scan"
         )
+        draw = gui.add_button(
+            "Draw a plane",
+            hint="then click two points of the scan: it stands upright through both; drag its balls to turn it",
+        )
         self._count = 0
+        self._begin: np.ndarray | None = None
+        self._ends = np.zeros((0, 3))  # of the plane that can be dragged [scan unit]
+        self._balls = DraggedBalls(view, "/mirror ends", self._drop, self._show_moved)
+        draw.on_click(view.step(self._start))
+        view.modes[PLANE_MODE] = self._click
         self.way.on_update(view.step(self._set))
         self.words.on_update(view.typed(lambda: self._set() if self.way.value == SYMMETRIES[2] else None))
 
@@ -44,27 +63,107 @@ class SymmetryTool:
         if plane != session.settings.symmetry:
             session.set("symmetry", symmetry=plane)
 
+    def _start(self) -> None:
+        self._begin = None
+        self.view.click.value = PLANE_MODE
+
+    def _click(self, origin: np.ndarray, ahead: np.ndarray) -> None:
+        session = self.view.session
+        assert session.cloud is not None
+        scanned = ScannedPoints.of(session.cloud, session.settings).places
+        found = nearest_point(self.view.frame.to_scene(scanned), origin, ahead, self.view.near)
+        if found is None:
+            raise InputError("no point of the scan is there; click on the scan")
+        if self._begin is None:
+            self._begin = scanned[found]
+            self._balls.show(self.view.frame.to_scene(self._begin[None]), np.array(PLANE_COLOR, np.uint8), PLANE_RADIUS)
+            return
+        begin, self._begin = self._begin, None
+        self.view.click.value = self.view.clicks[0]
+        self._set_drawn(upright_plane(begin, scanned[found]))
+
+    def _moved(self, number: int, place: np.ndarray) -> tuple[float, ...]:
+        """Return the plane with one of its ends at another place."""
+        ends = self._ends.copy()
+        ends[number] = place
+        return upright_plane(*ends)
+
+    def _show_moved(self, number: int, place: np.ndarray) -> None:
+        self._draw([self._moved(number, place)], self.view.frame)
+
+    def _drop(self, number: int, place: np.ndarray) -> None:
+        self._set_drawn(self._moved(number, place))
+
+    def _set_drawn(self, plane: tuple[float, ...]) -> None:
+        """Take the mirror plane of the scan that a drawn one means, or the drawn one where there is none."""
+        session = self.view.session
+        assert session.cloud is not None
+        points = np.asarray(session.cloud.points) + session.cloud.origin
+        meant = nearest_mirror_plane(points, plane, SYMMETRY_TOLERANCE * session.settings.length)
+        session.set("mirror plane", symmetry=(plane if meant is None else meant.row,))
+
     def fill(self, before: StudioState | None, state: StudioState) -> None:
-        """Show the planes of a state."""
+        """Show the planes of a state: those that are typed or dragged, or those that the grid has kept."""
         asked = state.settings.symmetry
-        if before is None or before.settings.symmetry != asked:
+        same = before is not None and before.settings.symmetry == asked
+        if not same:
             self.way.value = asked if asked == "auto" else SYMMETRIES[2 if asked else 0]
             if asked and not isinstance(asked, str):
                 self.words.value = ", ".join(f"{number:.7g}" for number in asked[0])
-        if before is not None and before.grid is state.grid and before.cloud is state.cloud:
+        if same and before is not None and before.grid is state.grid and before.cloud is state.cloud:
             return
-        made = state.grid.settings if state.grid is not None else None
-        planes = made.symmetry if made is not None and not isinstance(made.symmetry, str) else ()
-        self.view.scene.remove(*(f"/mirror/{k}" for k in range(self._count)))
+        made = state.grid.settings.symmetry if state.grid is not None and state.grid.settings is not None else ()
+        planes = made if isinstance(asked, str) else asked
+        self.view.scene.remove("/mirror ends")
+        if state.cloud is None or isinstance(planes, str):  # auto, of a grid that has not looked for them
+            planes = ()
+        if state.cloud is not None:
+            self._draw(planes, SceneFrame.of(state.cloud))
+        if state.cloud is not None and len(planes) == 1 and abs(planes[0][5]) < LEANING * math.hypot(*planes[0][3:]):
+            scanned = ScannedPoints.of(state.cloud, state.settings).places
+            ends = ends_on(scanned, np.array(planes[0], float), state.settings.length)
+            if ends is not None:
+                self._ends = ends
+                shown = SceneFrame.of(state.cloud).to_scene(ends)
+                self._balls.show(shown, np.array(PLANE_COLOR, np.uint8), PLANE_RADIUS)
+
+    def _draw(self, planes: Sequence[Sequence[float]], frame: SceneFrame) -> None:
+        """Draw planes in place of those that are drawn."""
+        self.view.scene.remove(*(f"/mirror/{k}" for k in range(len(planes), self._count)))
         self._count = len(planes)
+        faces = np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
         for k, plane in enumerate(planes):
-            assert state.cloud is not None
-            corners = corners_of(SceneFrame.of(state.cloud), np.array(plane, float))
-            faces = np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
             self.view.scene.api.add_mesh_simple(
-                f"/mirror/{k}", corners, faces, color=PLANE_COLOR, side="double", opacity=0.25, flat_shading=True,
-                cast_shadow=False, receive_shadow=False,
+                f"/mirror/{k}", corners_of(frame, np.array(plane, float)), faces, color=PLANE_COLOR, side="double", opacity=0.25,
+                flat_shading=True, cast_shadow=False, receive_shadow=False,
             )  # fmt: skip
+
+
+def upright_plane(begin: np.ndarray, end: np.ndarray) -> tuple[float, ...]:
+    """Return the upright plane through two places (3,): a point and its normal, six numbers.
+
+    Raises
+    ------
+    InputError
+        One lies above the other, so that any upright plane passes through both.
+    """
+    across = np.array([begin[1] - end[1], end[0] - begin[0], 0.0])
+    size = float(np.linalg.norm(across))
+    if size < ABOVE * float(np.linalg.norm(end - begin)) or size == 0.0:
+        raise InputError("a mirror plane needs two places that do not lie above each other")
+    return tuple(float(f"{number:.9g}") for number in (*begin.tolist(), *(across / size).tolist()))
+
+
+def ends_on(places: np.ndarray, plane: np.ndarray, length: float) -> np.ndarray | None:
+    """Return where a plane leaves the scan: the two places (2, 3) within half a member that lie farthest apart along it; None beside it."""
+    normal = plane[3:] / np.linalg.norm(plane[3:])
+    around = places - plane[:3]
+    near = np.flatnonzero(np.abs(around @ normal) <= length / 2)
+    along = around[near] @ np.array([-normal[1], normal[0], 0.0])
+    if len(near) < 2 or np.ptp(along) < length:
+        return None
+    ends: np.ndarray = places[near[[along.argmin(), along.argmax()]]].astype(float)
+    return ends - ((ends - plane[:3]) @ normal)[:, None] * normal
 
 
 def corners_of(frame: SceneFrame, plane: np.ndarray) -> np.ndarray:

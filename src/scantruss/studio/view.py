@@ -58,6 +58,8 @@ class StudioView:
         whole = float(client.camera.image_width or USUAL_WIDTH)
         self._width = max(whole - PANEL_WIDTH, 0.5 * whole)  # of the drawing once the panel is beside it [pixel]
         self._lock = RLock()
+        self._typed: dict[Callable[[], None], Timer] = {}  # steps of what was typed, which wait for more
+        self._typing = RLock()
         self._shown: StudioState | None = None
         self._model: tuple[StudioState, Model, Tables] | None = None
         if session.cloud is not None:  # seen while the controls are still being made
@@ -117,40 +119,50 @@ class StudioView:
     # ---- controls
 
     def step(self, step: Callable[[], None]) -> Callable[[Any], None]:
-        """Return what a control calls: errors are shown on the page, and what the server sets calls nothing."""
+        """Return what a control calls, after what was just typed; what is refused is shown, and what the server sets calls nothing."""
 
         def call(event: Any) -> None:
-            if getattr(event, "client", self.client) is not None:
+            if getattr(event, "client", self.client) is not None and self._take_typed():
                 self.do(step)
 
         return call
 
-    def do(self, step: Callable[[], None]) -> None:
-        """Take a step; what is refused is said on the page."""
+    def do(self, step: Callable[[], None]) -> bool:
+        """Take a step; what is refused is said on the page. Return whether it was taken."""
+        refused = False
         try:
             step()
         except Exception as error:  # the page goes on
             if not isinstance(error, ScanTrussError):
                 sys.excepthook(*sys.exc_info())
-            self.session.message = words_of(error)
+            self.session.message, refused = words_of(error), True
         else:
             self.session.message = "" if not self.session.stage else self.session.message
         self.update()
+        return not refused
 
     def typed(self, step: Callable[[], None]) -> Callable[[Any], None]:
         """Return what a text field calls: the step is taken when no more is typed."""
-        waiting: list[Timer] = []
 
         def call(event: Any) -> None:
             if getattr(event, "client", self.client) is None:
                 return
-            while waiting:  # ends: each turn takes one away
-                waiting.pop().cancel()
-            waiting.append(Timer(TYPING_PAUSE, self.do, (step,)))
-            waiting[0].daemon = True
-            waiting[0].start()
+            with self._typing:
+                if (timer := self._typed.pop(step, None)) is not None:
+                    timer.cancel()
+                timer = self._typed[step] = Timer(TYPING_PAUSE, self._take_typed, (step,))
+                timer.daemon = True
+                timer.start()
 
         return call
+
+    def _take_typed(self, *steps: Callable[[], None]) -> bool:
+        """Take steps of what was typed, all that wait where none are named; whether none was refused."""
+        with self._typing:
+            taken = [step for step in steps or tuple(self._typed) if step in self._typed]
+            for step in taken:
+                self._typed.pop(step).cancel()
+        return all([self.do(step) for step in taken])
 
     def do_quietly(self, step: Callable[[], None]) -> None:
         """Take a step of which there are many a second; what is refused is said on the page."""

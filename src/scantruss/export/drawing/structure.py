@@ -16,10 +16,11 @@ from .camera import choose_camera
 from .picture import UP
 from .strokes import INK, PAPER, look
 
-FORCES, USED, MOVED = "forces", "utilization", "displacements"  #: scales of colours
+FORCES, USED, MOVED, SIZES = "forces", "utilization", "displacements", "sizes"  #: scales of colours
 COLOUR_SCALES = {
     FORCES: ("#a50f15", "#e0745a", "#b6babd", "#6c9fd0", "#174a91"),  # compression red, tension blue
     USED: ("#bcc7cd", "#86b4bd", "#2f7fa0", "#14355e"),
+    SIZES: ("#bcc7cd", "#86b4bd", "#2f7fa0", "#14355e"),
     MOVED: ("#aab4ba", "#74a98f", "#e0a33a", "#a8321c"),
 }
 OVERUSED = "#d81e2c"  #: colour of a utilization over 1
@@ -39,16 +40,25 @@ class MemberPicture:
     title: str
     label: str  #: of the colour bar, with its unit
     values: np.ndarray  #: (M,) what the colours of the members mean
-    colours: str  #: FORCES, USED or MOVED
+    colours: str  #: FORCES, USED, MOVED or SIZES
     moves: np.ndarray | None = None  #: (V, 3) displacements [m], drawn times `factor`
     factor: float = 1.0
+    most: float | None = None  #: where the colours end; None: at the greatest of `values`
 
 
 def moved_picture(truss: Truss, title: str, moves: np.ndarray) -> MemberPicture:
     """Return a picture of displacements (V, 3) [m], drawn so large that they can be seen."""
     size = np.linalg.norm(moves, axis=1)
     factor = float(f"{_drawn(truss) / max(float(size.max()), 1e-300):.1g}")
-    return MemberPicture(title, "displacement [mm]", 1e3 * size[truss.members].mean(axis=1), MOVED, moves, factor)
+    return MemberPicture(
+        title,
+        "displacement [mm]",
+        1e3 * size[truss.members].mean(axis=1),
+        MOVED,
+        moves,
+        factor,
+        1e3 * float(size.max()),
+    )
 
 
 def mode_picture(truss: Truss, title: str, shape: np.ndarray) -> MemberPicture:
@@ -56,7 +66,12 @@ def mode_picture(truss: Truss, title: str, shape: np.ndarray) -> MemberPicture:
     size = np.linalg.norm(shape, axis=1)
     most = float(size.max()) or 1.0
     return MemberPicture(
-        title, "share of the greatest", size[truss.members].mean(axis=1) / most, MOVED, shape * _drawn(truss) / most
+        title,
+        "displacement over the greatest",
+        size[truss.members].mean(axis=1) / most,
+        MOVED,
+        shape * _drawn(truss) / most,
+        most=1.0,
     )
 
 
@@ -177,7 +192,7 @@ def _scale(shown: MemberPicture) -> Any:
     """Return what takes values to colours: forces around nil, utilizations up to 1, the rest from nil."""
     from matplotlib.colors import Normalize
 
-    most = float(np.abs(shown.values).max(initial=0.0)) or 1.0
+    most = shown.most or float(np.abs(shown.values).max(initial=0.0)) or 1.0
     if shown.colours == FORCES:
         return Normalize(-most, most)
     return Normalize(0.0, min(most, 1.0) if shown.colours == USED else most)

@@ -17,7 +17,7 @@ from ...errors import InputError
 from ...grid.grid import Grid
 from ...grid.marks import member_marks, numbered
 from ...kernels.geometry.components import component_labels
-from ..solid import balls_of, bars_of, check_diameters, marked_bars, unite
+from ..solid import balls_of, bars_of, check_diameters, marked_bars, outer_normals, unite
 from .plates import Bed, PrintedPart
 
 PEG_SIDES = 32
@@ -88,6 +88,11 @@ def flat_axes(points: np.ndarray) -> np.ndarray:
         axis *= 1.0 if axis[np.abs(axis).argmax()] > 0 else -1.0
     axes[2] = np.cross(axes[0], axes[1])
     return axes
+
+
+def _outside_up(axes: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """Return axes (3, 3) turned about the first one by half a turn where the outside, with the marks, would lie on the bed."""
+    return axes if axes[2] @ normal >= 0 else axes * np.array([[1.0], [-1.0], [-1.0]])
 
 
 def divide(nodes: np.ndarray, edges: np.ndarray, bed: Bed, pad: float, pad_cut: float) -> tuple[np.ndarray, np.ndarray]:
@@ -163,8 +168,15 @@ def build_parts(
         edges = np.where((along < 0)[:, None], edges[:, ::-1], edges)  # from the side with pegs to that with sockets
     balls = balls_of(grid, used, nodes, node / 2, sides, marks)
     whole = bars_of(nodes, edges, member / 2, sides)
+    halves = _halves(nodes, edges)
+    at_ends = [bars_of(*half, member / 2, sides) for half in halves]
     if marks:
-        whole = marked_bars(grid, nodes, edges, whole, member / 2, node / 2, sides)
+        whole = marked_bars(grid, nodes, edges, whole, member / 2, (node / 2,) * 2, sides)
+        taken = node / 2, joint.reach
+        at_ends = [
+            marked_bars(grid, *half, bars, member / 2, taken, sides) for half, bars in zip(halves, at_ends, strict=True)
+        ]
+    normals = outer_normals(grid)[used]
     names = numbered("part ", int(part_of.max()) + 1, 1)
     made = []
     for number, name in enumerate(names):
@@ -174,17 +186,24 @@ def build_parts(
         bodies = [*(balls[k] for k in ids.tolist()), *(whole[k] for k in inner.tolist())]
         sockets, middles = [], []
         for k in np.flatnonzero(mine.sum(axis=1) == 1).tolist():
-            a, b = nodes[edges[k]]
-            plug = bool(mine[k, 0])
-            end, hollow = _half(a if plug else b, (a + b) / 2, pulled[k], member / 2, joint, sides, plug=plug)
+            middle, plug = nodes[edges[k]].mean(axis=0), bool(mine[k, 0])
+            end, hollow = _coupled(at_ends[0 if plug else 1][k], middle, pulled[k], joint, plug=plug)
             bodies.append(end)
             sockets += [] if hollow is None else [hollow]
-            middles.append((a + b) / 2)
+            middles.append(middle)
         body = unite(bodies)
         if sockets:
             body -= unite(sockets)
         points = np.concatenate([nodes[ids], np.reshape(middles, (-1, 3))])
-        made.append(PrintedPart(name, body, flat_axes(points), len(inner) - len(ids) + 1, used[ids]))
+        made.append(
+            PrintedPart(
+                name,
+                body,
+                _outside_up(flat_axes(points), normals[ids].sum(axis=0)),
+                len(inner) - len(ids) + 1,
+                used[ids],
+            )
+        )
     check_apart(made)
     return made
 
@@ -202,13 +221,17 @@ def check_apart(parts: list[PrintedPart]) -> None:
             )
 
 
-def _half(
-    node: np.ndarray, middle: np.ndarray, pull: np.ndarray, radius: float, joint: Joint, sides: int, *, plug: bool
-) -> tuple[Any, Any]:
+def _halves(nodes: np.ndarray, edges: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Return the halves of the members from their starts, then from their ends: nodes and middles (V + E, 3), and their numbers (E, 2)."""
+    middles = len(nodes) + np.arange(len(edges))
+    places = np.concatenate([nodes, nodes[edges].mean(axis=1)])
+    return [(places, np.stack([end, middles], axis=1)) for end in edges.T]
+
+
+def _coupled(bar: Any, middle: np.ndarray, pull: np.ndarray, joint: Joint, *, plug: bool) -> tuple[Any, Any]:
     """Return half a member with its half of the coupling, and what is to be taken off for the socket; None on the side of the peg."""
     way = pull if plug else -pull  # towards the other part
-    [bar] = bars_of(np.stack([node, middle]), np.array([[0, 1]]), radius, sides)
-    bar -= _cylinder(middle, way, joint.wide, joint.half + joint.clearance)
+    bar = bar - _cylinder(middle, way, joint.wide, joint.half + joint.clearance)
     own = _cylinder(middle, -way, joint.radius, joint.half)
     if plug:
         start = middle - way * joint.half / 2

@@ -22,6 +22,7 @@ MEASURED = 100.0  #: size of the letters that are measured [pt]
 SPACING = 1.42  #: from line to line, in sizes of letters
 PAGE_HEAD = 30.0  #: height of the head of a section [pt]
 GAP = 9.0  #: between columns [pt]
+BOLD = 1.18  #: width of bold letters over that of plain ones
 GREY, RULE, WARNING_COLOUR = "#5b6675", "#8b95a1", "#a85a00"
 
 
@@ -148,7 +149,9 @@ def _data_table(pages: PdfPages, part: DataTable) -> None:
                 )
 
     def head() -> None:
-        wrapped = [_wrapped(cell, size, width + 0.5) or [""] for cell, width in zip(part.head, widths, strict=True)]
+        wrapped = [
+            _wrapped(cell, size, width / BOLD + 0.5) or [""] for cell, width in zip(part.head, widths, strict=True)
+        ]
         most = max(map(len, wrapped))
         top = pages.room(SPACING * size * most + 5)
         for column, lines in enumerate(wrapped):
@@ -176,7 +179,7 @@ def _fitting(part: DataTable) -> tuple[float, list[float]]:
         widths = [
             max(
                 [_width(cell, size) for cell in cells[1:]]
-                + [max(_width(word, size) * 1.18 for word in cells[0].split(" "))]
+                + [max(_width(word, size) * BOLD for word in cells[0].split(" "))]
             )
             for cells in columns
         ]
