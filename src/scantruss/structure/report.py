@@ -251,8 +251,7 @@ def structure_lines(report: StructureReport, *, most: int = 12) -> list[tuple[st
     return [
         (
             case.name,
-            words_of_number(case.applied[2] / 1e3, 4),
-            words_of_number(case.reactions[2] / 1e3, 4),
+            *(_kilonewtons(force, case) for force in (case.applied[2], case.reactions[2])),
             words_of_number(1e3 * case.displacement_max, 3),
             words_of_number(case.force_min / 1e3, 4),
             words_of_number(case.force_max / 1e3, 4),
@@ -262,12 +261,21 @@ def structure_lines(report: StructureReport, *, most: int = 12) -> list[tuple[st
     ]
 
 
+def _kilonewtons(force: float, case: CaseFigures) -> str:
+    """Return a force of a case for a table; 0 where it is rounding beside the forces in the members."""
+    rounding = 1e-9 * max(abs(case.force_min), abs(case.force_max))
+    return words_of_number(force / 1e3, 4) if abs(force) > rounding else "0"
+
+
 def unlisted_lines(report: StructureReport) -> list[str]:
     """Return a line on how many combinations `structure_lines` leaves out; nothing where it has all."""
     more = len(report.cases) - len(structure_lines(report))
-    return [f"and {more:,} more combination{'s' * (more > 1)}, which use the members or move the nodes less"] * (
-        more > 0
+    which = (
+        "combinations, which use the members or move the nodes"
+        if more > 1
+        else "combination, which uses the members or moves the nodes"
     )
+    return [f"and {more:,} more {which} less"] * (more > 0)
 
 
 def half_lines(report: StructureReport) -> list[str]:
