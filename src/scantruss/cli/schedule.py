@@ -176,6 +176,7 @@ def mirrored_words(types: Schedule) -> str:
 def warning_lines(warnings: Schedule) -> list[str]:
     """Say of each kind of warning how many there are, and the worst."""
     from ..schedules.clashes import HEAVY_BALLS
+    from ..structure.loads import MOST_ALLOWANCE
 
     lines = []
     for words in dict.fromkeys(warnings["warning"]):
@@ -184,9 +185,14 @@ def warning_lines(warnings: Schedule) -> list[str]:
         value, limit = float(worst or 0), None if given is None else float(given)
         most = f"{words_of_number(value, 4)} {measure}".rstrip() + ("" if at is None else f" at {at}")
         if words == HEAVY_BALLS and limit is not None:
+            way = (
+                f"structure --node-allowance {value / 100:.2f} takes that into account"
+                if value <= 100 * MOST_ALLOWANCE
+                else f"structure takes {MOST_ALLOWANCE:.0%} at most: thinner tubes or longer members make balls lighter beside them"
+            )
             lines.append(
                 f"warning: the balls weigh {value:.0f} % of the members, and the structure was solved with {limit:.0f} % for its nodes;"
-                f" structure --node-allowance {value / 100:.2f} takes that into account"
+                f" {way}"
             )
         elif limit is None:  # what is never carried at all
             lines.append(f"warning: {words}; the greatest is {most}")

@@ -121,7 +121,7 @@ def setout_lines(made: SettingOut) -> list[str]:
         if (now := props.tolist()) != before:
             named = " ".join(made.node_marks[k] for k in now[:PROPS_NAMED])
             more = f" and {len(now) - PROPS_NAMED:,} more" if len(now) > PROPS_NAMED else ""
-            lines.append(f"from step {number} on {len(now):,} props: {named}{more}")
+            lines.append(f"from step {number} on {len(now):,} {'prop' if len(now) == 1 else 'props'}: {named}{more}")
         before = now
     if len(made.steps[-1].props):
         lines.append("warning: the whole does not stand by itself; use more supports or rigid joints")

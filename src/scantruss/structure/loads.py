@@ -42,6 +42,7 @@ VARIABLE_FACTOR = 1.5  #: of variable actions: EN 1990 table A1.2(B)
 COMPANION = {"variable": 0.7, "snow": 0.5, "wind": 0.6, "temperature": 0.6}
 ACTIONS = ("permanent", *COMPANION)
 ON_AREAS = ("cladding", "snow", "half-snow", "wind")
+MOST_ALLOWANCE = 2  #: weight of the nodes over that of the members; more is a share that was meant in percent
 LOAD_NAMES = ("self", "cladding", "snow", "half-snow", "wind", "temperature")
 LOAD_WORDS = "self, cladding:P, snow:P, half-snow:P, wind:P:C, temperature:T"
 ONCE = ("self", "snow", "temperature")  #: loads of which a second one is a slip
@@ -63,8 +64,10 @@ def cases_of(truss: Truss, loads: str | Sequence[Any], node_allowance: float = 0
     InputError
         A load cannot be understood, has no unit or acts on an area where there is none.
     """
-    if not 0 <= node_allowance <= 2:
-        raise InputError(f"node_allowance is a share of the members' weight, 0 to 2, got {node_allowance!r}")
+    if not 0 <= node_allowance <= MOST_ALLOWANCE:
+        raise InputError(
+            f"node_allowance is a share of the members' weight, 0 to {MOST_ALLOWANCE}, got {node_allowance!r}"
+        )
     given = split_loads(loads) if isinstance(loads, str) else list(loads)
     words = [str(load).strip().partition(":")[0] for load in given if not isinstance(load, LoadCase | Mapping)]
     for name in ONCE:
