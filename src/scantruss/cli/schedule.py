@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from ..errors import InputError, words_of_number
 from .grids import add_grid, read_grid_or_structure
-from .outputs import claim, outs_of
+from .outputs import claim, outs_of, wrote_line
 
 if TYPE_CHECKING:
     from ..schedules.records import Schedule, Schedules
@@ -141,10 +141,11 @@ def make_schedule(values: Namespace) -> None:
         what, checked = read_grid_or_structure(values.grid, values.merge, bars)
         bars("schedules", 0.0)
         made = schedule(what, settings, keep_failed=values.keep_failed, checked=checked)
+        files: dict[Path, int] = {}
         for number, out in enumerate(outs):
             bars("write", number / len(outs))
-            write_schedules(made, save.beside(out))
-    print_lines([*schedule_lines(made, settings), f"wrote {' '.join(map(str, outs))}"])
+            files[out] = len(write_schedules(made, save.beside(out)))
+    print_lines([*schedule_lines(made, settings), wrote_line(files)])
 
 
 def schedule_lines(made: Schedules, settings: ScheduleSettings) -> list[str]:
