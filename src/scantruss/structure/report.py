@@ -285,9 +285,10 @@ def half_lines(report: StructureReport) -> list[str]:
         return []
     moved = max(part_loaded, key=lambda case: case.displacement_max)
     used = max(part_loaded, key=lambda case: case.utilization_max or 0.0)
-    most = f", {used.name} uses the members most, {use_words(used.utilization_max)}" if used.utilization_max else ""
+    which = "and" if used is moved else f"and {used.name}"
+    most = f", {which} uses the members most, {use_words(used.utilization_max)}" if used.utilization_max else ""
     return [
-        f"of {len(part_loaded)} cases of half the snow {moved.name} moves the nodes most, {1e3 * moved.displacement_max:.3g} mm{most}"
+        f"of {len(part_loaded)} cases with half the snow, {moved.name} moves the nodes most, {1e3 * moved.displacement_max:.3g} mm{most}"
     ]
 
 
