@@ -127,6 +127,6 @@ def with_warning_of_planes(grid: Grid) -> Grid:
         " diagonal off"
     )
     if grid.cells == "quad" and grid.settings is not None and grid.settings.rows != "curvature":
-        words += "; --rows curvature turns the rows to where they can be"
+        words += "; rows along the curvature may be (--rows curvature)"
     warning = Fault("plane", words, first, tuple(others))
     return grid.replace(certificate=replace(grid.certificate, warnings=(*grid.certificate.warnings, warning)))

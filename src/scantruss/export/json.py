@@ -145,6 +145,8 @@ def read_grid(path: str | Path) -> Grid:
     if not isinstance(values, dict) or kind != FORMAT:
         raise FormatError(f'{path} has no "format": "{FORMAT}"; a grid saved as .json by scantruss grid is needed')
     version = values.get("format_version")
+    if version is None:
+        raise FormatError(f"{path} is a damaged grid: format_version is missing; write it again with scantruss grid")
     if not isinstance(version, int) or not 1 <= version <= FORMAT_VERSION:
         raise FormatError(
             f"{path} has format_version {version!r}, known is up to {FORMAT_VERSION}; read it with a newer ScanTruss"
