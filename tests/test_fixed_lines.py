@@ -26,6 +26,7 @@ from scantruss.export.style import FileStyle
 from scantruss.improve.working_mesh import close_net, open_net
 from scantruss.kernels.boundary.curves import at_arc, is_open, slide
 from scantruss.kernels.mesh import grid as moves
+from scantruss.kernels.mesh.local_search import COLLAPSE, is_allowed
 
 NOISE = 0.003
 
@@ -328,6 +329,21 @@ def test_no_row_of_moves_takes_a_chain_apart(seed: int) -> None:
     wanted = [grid.nodes[chain[0]], grid.nodes[chain[-1]]]
     assert sorted(map(tuple, ends)) == sorted(map(tuple, wanted))
     assert len(after.lines) == len(counts) - 1  # one path, no ring beside it
+
+
+@pytest.mark.parametrize(("pieces", "allowed"), [(1.4, True), (1.7, False)])
+def test_the_last_node_of_a_line_stays_where_its_ends_are_too_far_apart(pieces: float, allowed: bool) -> None:
+    """A member between two corners could not be split again, so a long one never comes to be."""
+    rough = rough_disc(length=0.3, points=2000)
+    first, middle, last = chain_through(rough.grid, np.random.default_rng(1))[:3]
+    grid = rough.grid.replace(lines=np.sort(np.array([(first, middle), (middle, last)]), axis=1))
+    net, _ = open_net(grid)
+    net.kind[middle], net.curve[middle] = moves.ON_CURVE, 0
+    assert moves.may_collapse(net, first, middle)
+    length = float(np.linalg.norm(net.nodes[last] - net.nodes[first])) / pieces
+    assert is_allowed(net, COLLAPSE, first, middle, length) == allowed
+    net.kind[last], net.curve[last] = moves.ON_CURVE, 0  # then others are left
+    assert is_allowed(net, COLLAPSE, first, middle, length)
 
 
 @pytest.mark.kernels

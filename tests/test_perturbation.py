@@ -67,7 +67,7 @@ def test_a_kick_that_does_not_pay_leaves_no_trace(settled: tuple[Rough, WorkingM
     perturbed = 0
     for v in np.flatnonzero(net.degree > 0)[::2].tolist():
         assert kernels.list_area(net, mesh.patches, area, v) == kernels.LISTED
-        perturbed += kernels.move_at_random(net, mesh.patches, mesh.curves, scratch, area)
+        perturbed += kernels.move_at_random(net, mesh.patches, mesh.curves, scratch, area, mesh.length)
         kernels.settle_area(net, mesh.patches, mesh.curves, area, mesh.length, LENGTH_WEIGHT)
         kernels.search_area(net, mesh.patches, mesh.curves, scratch, area, mesh.length, LENGTH_WEIGHT, 0.05)
         kernels.put_area_back(net, mesh.patches, area)
@@ -88,7 +88,7 @@ def test_the_energy_of_the_area_changes_by_as_much_as_that_of_the_grid(
             kernels.area_energy(net, mesh.patches, scratch, area, mesh.length, LENGTH_WEIGHT),
             energy_of(mesh, scratch),
         )
-        kernels.move_at_random(net, mesh.patches, mesh.curves, scratch, area)
+        kernels.move_at_random(net, mesh.patches, mesh.curves, scratch, area, mesh.length)
         kernels.settle_area(net, mesh.patches, mesh.curves, area, mesh.length, LENGTH_WEIGHT)
         kernels.search_area(net, mesh.patches, mesh.curves, scratch, area, mesh.length, LENGTH_WEIGHT, 0.0)
         after = (
@@ -182,7 +182,7 @@ def test_a_net_is_as_before_until_a_member_of_the_area_changes(
         before = trace(net)[:2]
         assert kernels.list_area(net, mesh.patches, area, v) == kernels.LISTED
         assert kernels.is_as_before(net, area)
-        made = kernels.move_at_random(net, mesh.patches, mesh.curves, scratch, area)
+        made = kernels.move_at_random(net, mesh.patches, mesh.curves, scratch, area, mesh.length)
         used, rings = trace(net)[:2]
         same = used == before[0] and all(set(a) == set(b) for a, b in zip(rings, before[1], strict=True))
         assert kernels.is_as_before(net, area) == same

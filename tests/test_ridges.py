@@ -310,3 +310,14 @@ def test_a_fold_is_measured_where_it_is() -> None:
             assert np.abs(found[[0, 2]] + cloud.origin[[0, 2]]).max() < 0.02
             assert abs(found[4]) > 0.999 and np.degrees(found[6]) == pytest.approx(degrees, abs=5.0)
             assert found[7] > 1000 and found[8] < 0.02
+
+
+def test_ridges_are_found_once_for_the_same_samples_and_settings() -> None:
+    settings = Settings(length=SIZE)
+    samples = sample_surface(PointCloud.from_array(box()), settings)
+    first, again = (find_ridges(samples, settings) for _ in range(2))
+    assert len(first) == 12
+    assert all(one is other for one, other in zip(first, again, strict=True))
+    first.clear()  # what a caller does with the list is its own business
+    assert len(find_ridges(samples, settings)) == 12
+    assert find_ridges(samples, settings.replace(ridge_angle=120.0)) == []

@@ -14,7 +14,7 @@ from .errors import FrontError, Place
 from .front.advance import advance_front
 from .front.orientation_field import Field, orientation_fields
 from .improve.equalize import energy_of_node
-from .improve.optimize import improve_first, improve_last, with_tips
+from .improve.optimize import improve_first, improve_last, searched_again, with_tips
 from .improve.rings import finish_rings
 from .runtime.parallel import processors
 from .runtime.progress import Progress, WatchedProgress, seer_of
@@ -32,10 +32,11 @@ Job = TypeVar("Job")
 Result = TypeVar("Result")
 
 FULLY_IMPROVED = {"quick": 1, "normal": 1, "best": 3}  # fronts that are improved to the end
-# energy a node of the share of the scan that is missed, of its distance at 95 or 99 % [members]
-MISSING_ENERGY, DISTANCE_ENERGY = 4.0, 0.1
+# energy a node of the share of the scan that is missed, of its distance at 95 %, and at 99 % where tips count [members]
+MISSING_ENERGY, DISTANCE_ENERGY, TIPS_ENERGY = 4.0, 0.1, 0.3
 MISSED_MORE = 0.002  # share of the scan that the grid of a longer search may miss beyond that of a shorter one
 TURNS_OF_TIPS = 5  # times that nodes are put on tips
+TIMES_OF_A_FAULT = 2  # times that tips are given up near the same fault, ever farther around
 MOST_MISSED = 0.2  # largest share of the scan that a grid may miss where they are put on tips
 POOR_SHAPE = 0.4  # shape quality of its worst triangle below which a grid is poor: more finalists are tried
 FINALIST_BATCHES = 2  # times that finalists are tried
@@ -59,19 +60,19 @@ class Candidate:
     @property
     def cost(self) -> float:
         """The energy for a node, and what the grid misses of the scan."""
-        return self._cost("p95")
+        return self._cost("p95", DISTANCE_ENERGY)
 
     @property
     def cost_of_tips(self) -> float:
         """The same where tips count, which are no more than a few hundredths of a scan."""
-        return self._cost("p99")
+        return self._cost("p99", TIPS_ENERGY)
 
-    def _cost(self, quantile: str) -> float:
+    def _cost(self, quantile: str, distance_energy: float) -> float:
         found = self.grid.certificate if self.grid is not None else None
         if found is None or found.scan_distance is None:
             return self.energy
         distance = getattr(found.scan_distance, quantile) / self.settings.length
-        return self.energy + MISSING_ENERGY * found.missing + DISTANCE_ENERGY * float(distance)
+        return self.energy + MISSING_ENERGY * found.missing + distance_energy * float(distance)
 
     @property
     def is_poor(self) -> bool:
@@ -196,24 +197,41 @@ def reach_tips_of(
     """Put nodes on the tips of the scan that a grid misses, as long as it is better for it and nothing else goes wrong.
 
     Each turn either keeps the nodes on some tips, beside which there may be more, or gives up the tips near a fault that came of them.
+    In the end the grid is searched again.
     """
-    faults: list[Place] = []
-    for _ in range(TURNS_OF_TIPS if settings.method == "default" else 0):
-        kept, before, cost = candidate.mesh.copied(), candidate.grid, candidate.cost_of_tips
-        grid = with_tips(candidate.mesh, candidate.front, samples, constraints, candidate.settings, faults)
-        if grid is None:
-            return
-        grid = finish_rings(grid, boundary).replace(settings=settings)
-        candidate.grid = checked(grid, samples, boundary, settings)
+    mesh, of_scan = candidate.mesh, (candidate.front, samples, constraints, candidate.settings)
+
+    def faults_of(grid: Grid, cost: float) -> list[Place] | None:
+        """Take the grid that the mesh has become where it is better; else return the places of what went wrong in it."""
+        before, candidate.grid = (
+            candidate.grid,
+            checked(finish_rings(grid, boundary).replace(settings=settings), samples, boundary, settings),
+        )
         if misses_at_most(candidate.grid, MOST_MISSED) and candidate.cost_of_tips < cost:
-            continue
+            return None
         found = candidate.grid.certificate
-        fresh = [fault.where for fault in (found.faults if found else ()) if fault.where and fault.where not in faults]
-        candidate.mesh.restore(kept)
         candidate.grid = before
-        if not fresh:
-            return
-        faults += fresh
+        faults = found.faults if found else ()
+        return [fault.where for fault in faults if fault.where and fault.kind != "cover"]
+
+    given_up: list[Place] = []
+    reached = False
+    for _ in range(TURNS_OF_TIPS if settings.method == "default" else 0):
+        kept, cost = mesh.copied(), candidate.cost_of_tips
+        grid = with_tips(mesh, *of_scan, given_up)
+        places = faults_of(grid, cost) if grid is not None else []
+        if places is None:
+            reached = True
+            continue
+        mesh.restore(kept)
+        again = [place for place in places if given_up.count(place) < TIMES_OF_A_FAULT]
+        if not again:
+            break
+        given_up += again
+    if reached and settings.effort != "quick":
+        kept, cost = mesh.copied(), candidate.cost_of_tips
+        if faults_of(searched_again(mesh, *of_scan), cost) is not None:
+            mesh.restore(kept)
 
 
 def chosen(passed: Sequence[Candidate]) -> Grid:
@@ -251,6 +269,7 @@ def _is_no_worse(grid: Grid, other: Grid) -> bool:
         grid.quality.length_cv <= other.quality.length_cv
         and grid.quality.shape_mean >= other.quality.shape_mean
         and one.scan_distance.p95 <= two.scan_distance.p95
+        and one.scan_distance.p99 <= two.scan_distance.p99
         and one.missing <= two.missing + MISSED_MORE
     )
 

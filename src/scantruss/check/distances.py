@@ -84,13 +84,11 @@ def distances_to_points(
     boxes = boxes_of(points, max(POINT_BOX * length, 2.0 * samples.spacing))
     middles = grid.nodes[grid.triangles].mean(axis=1)
     to_middles, to_corners = np.empty(len(middles)), np.empty(len(grid.nodes))
-    to_nodes, noise = np.empty(len(grid.nodes)), np.empty(len(grid.nodes))
     nearest_distances(middles, points, boxes, 0.25 * length, to_middles)
     nearest_distances(grid.nodes, points, boxes, 0.25 * length, to_corners)
     if samples.moved:  # nodes lie on the mean surface
-        points = samples.surface.points
-        boxes = boxes_of(points, POINT_BOX * length)
-    plane_distances(grid.nodes, points, boxes, POINTS_OF_PLANE, 2.5 * samples.spacing, to_nodes, noise)
+        boxes = boxes_of(samples.surface.points, POINT_BOX * length)
+    to_nodes, noise = distances_to_planes(grid.nodes, samples, boxes)
     if samples.measured < len(samples.surface.mean):
         to_middles[_over_holes(middles, samples)] = np.nan
         over = _over_holes(grid.nodes, samples)
@@ -98,6 +96,24 @@ def distances_to_points(
     if grid.deviation is not None:
         to_nodes[np.isnan(grid.deviation)] = np.nan
     return np.fmax(to_middles, np.fmax.reduce(to_corners[grid.triangles], axis=1)), to_nodes, noise
+
+
+def distances_to_planes(
+    places: np.ndarray, samples: SurfaceSamples, boxes: SearchBoxes
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the distance of places (Q, 3) from the plane of the points around each, and the rms distance of these from it (Q,).
+
+    boxes : the points by box
+    """
+    points = points_of_planes(samples)
+    distance, noise = np.empty(len(places)), np.empty(len(places))
+    plane_distances(places, points, boxes, POINTS_OF_PLANE, 2.5 * samples.spacing, distance, noise)
+    return distance, noise
+
+
+def points_of_planes(samples: SurfaceSamples) -> np.ndarray:
+    """Return the points (N, 3) from which nodes are measured: those that were read, or of the mean surface where nodes lie on that."""
+    return samples.surface.points if samples.moved else samples.measured_points
 
 
 def offsets_from_points(grid: Grid, samples: SurfaceSamples, length: float) -> tuple[np.ndarray, np.ndarray]:

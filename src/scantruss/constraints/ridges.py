@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Sequence
 from itertools import combinations
 from typing import TYPE_CHECKING
@@ -30,16 +31,27 @@ LONGEST_BETWEEN_CORNERS = 1.8  # longest ridge that is looked for between two co
 SHORTEST_RIDGE = 0.35  # shortest such ridge [member lengths]
 
 
+_KEPT: weakref.WeakKeyDictionary[SurfaceSamples, tuple[Settings, tuple[Ridge, ...]]] = weakref.WeakKeyDictionary()
+
+
 def find_ridges(samples: SurfaceSamples, settings: Settings) -> list[Ridge]:
     """Return the ridges of a scan, open ones first, the longest first.
 
     A ridge turns by `ridge_angle` within a member. Weaker ones count where they come to one: a roof has all of its hips or none.
+    The last result is cached for as long as the samples exist.
     """
+    kept = _KEPT.get(samples)
+    if kept is None or kept[0] != settings:
+        kept = _KEPT[samples] = (settings, _find_ridges(samples, settings))
+    return list(kept[1])
+
+
+def _find_ridges(samples: SurfaceSamples, settings: Settings) -> tuple[Ridge, ...]:
     tracer = Tracer(samples, settings)
     traced = [Ridge(folds[:, :3], _is_sharp(folds, tracer.angle)) for folds in tracer.trace()]
     ridges = kept_ridges(join_ends(traced, settings.length), settings.length)
     ridges = [ridge.moved(tracer.onto_scan(ridge.places)) for ridge in ridges + short_ridges(ridges, tracer)]
-    return sorted(ridges, key=lambda ridge: (ridge.ring, -len(ridge.places)))
+    return tuple(sorted(ridges, key=lambda ridge: (ridge.ring, -len(ridge.places))))
 
 
 def add_ridges(network: Network, ridges: list[Ridge]) -> None:

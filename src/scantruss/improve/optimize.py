@@ -15,6 +15,8 @@ from ..surface.scratch import with_own_scratch
 from .equalize import equalize, finish
 from .fixed_nodes import fix_nearest_nodes, fix_nodes, hold_nodes
 from .flips import flip_by_angle
+from .mend import mend_poor_places
+from .off_scan import put_on_scan
 from .perturbation import search_widely
 from .sliding_nodes import with_boundary_members, with_line_sets
 from .smoothing import smooth
@@ -30,6 +32,7 @@ if TYPE_CHECKING:
 
 # factor of the weight of folds: a longer search can afford more of it
 FOLDS = {"quick": 1.0, "normal": 1.0, "best": 1.6}
+TIMES_MENDED = 2  # times that poor places are mended at most, after each of which the mesh comes to rest anew
 
 Report = Callable[[float], None]
 
@@ -145,8 +148,17 @@ def with_tips(
 
     faults : places [scan unit] where such grids failed
     """
-    reached = reach_tips(mesh, front, samples, faults)
-    return put_down(mesh, front, samples, constraints, settings) if reached else None
+    if not reach_tips(mesh, front, samples, faults):
+        return None
+    return put_down(mesh, front, samples, constraints, settings)
+
+
+def searched_again(
+    mesh: WorkingMesh, front: Grid, samples: SurfaceSamples, constraints: Constraints, settings: Settings
+) -> Grid:
+    """Return the grid of a mesh that was put down, searched again as with effort `normal`, as new nodes leave others uneven."""
+    search_widely(mesh, "normal")
+    return put_down(mesh, front, samples, constraints, settings)
 
 
 def put_down(
@@ -160,8 +172,15 @@ def put_down(
         else:
             finish(mesh, settings.prefer)
         project_onto_scan(mesh, samples, boundary=not settings.boundary)
+        if settings.method == "default":
+            put_on_scan(mesh, samples, settings)
 
     closed, before, _ = side_by_side(lambda: mesh.close(front), lambda: front.quality, come_to_rest)
+    for _ in range(TIMES_MENDED if settings.method == "default" else 0):
+        if not mend_poor_places(mesh, settings):
+            break
+        come_to_rest()
+        closed = mesh.close(front)
     grid = with_boundary_members(mesh.to_grid(front, closed), constraints.lines, settings.length)
     grid = with_line_sets(grid, constraints.lines, settings.length)
     return grid.replace(settings=settings, before=before)

@@ -7,6 +7,7 @@ position does.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -24,11 +25,13 @@ if TYPE_CHECKING:
     from ..grid.grid import Grid
     from ..surface.samples import SurfaceSamples
 
-LEAST_TIP = 0.36  # distance of a tip from the grid, at least [member lengths]
+LEAST_TIP = 0.32  # distance of a tip from the grid, at least [member lengths]
 FARTHEST_TIP = 1.2  # what is farther away is no tip but a part without a grid [member lengths]
 TIPS_APART = 1.0  # least distance between two tips [member lengths]
 TIP_TO_BOUNDARY = 0.5  # distance from the boundary within which no tip is looked for [member lengths]
-GIVEN_UP_WITHIN = 3.0  # distance from a fault within which tips are given up [member lengths]
+GIVEN_UP_WITHIN = (
+    1.5  # distance from a fault within which tips are given up, for each time that it came up [member lengths]
+)
 MOST_TIPS = 40  # most tips at a time, the farthest first
 ENERGY_OF_TIP = 2.0  # most energy that a node on a tip may cost
 
@@ -43,7 +46,7 @@ def reach_tips(mesh: WorkingMesh, front: Grid, samples: SurfaceSamples, faults: 
         What the mesh was opened from.
     samples : SurfaceSamples
     faults : places [scan unit], optional
-        Where grids failed whose tips were reached: there they are given up.
+        Where grids failed whose tips were reached: there they are given up, farther around where the same place came up again.
     """
     scratch = new_scratch(mesh)
     scratch.tried[:] = 1
@@ -65,13 +68,13 @@ def find_tips(
     off = away / local
     order = np.argsort(-off, kind="stable")
     order = order[(off[order] >= LEAST_TIP) & (off[order] <= FARTHEST_TIP)]
-    given_up = np.reshape(faults, (-1, 3)) - samples.origin
+    given_up = [(np.array(fault) - samples.origin, times) for fault, times in Counter(faults).items()]
     tips: list[np.ndarray] = []
     for place, size in zip(places[order], local[order], strict=True):
         if len(tips) == MOST_TIPS:
             break
         near = [np.linalg.norm(place - tip) < TIPS_APART * size for tip in tips]
-        near += [np.linalg.norm(place - fault) < GIVEN_UP_WITHIN * size for fault in given_up]
+        near += [np.linalg.norm(place - fault) < times * GIVEN_UP_WITHIN * size for fault, times in given_up]
         if not any(near) and not _is_at_boundary(mesh, place, TIP_TO_BOUNDARY * size):
             tips.append(place)
     return tips

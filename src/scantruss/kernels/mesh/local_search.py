@@ -15,6 +15,7 @@ from .grid import (
     Net,
     collapse,
     flip,
+    is_line,
     may_collapse,
     may_flip,
     may_split,
@@ -36,6 +37,9 @@ EARLY_ALLOWANCE = (0.35, 1.2, 2.0)  # growth of the energy up to which a trial g
 LATE_ALLOWANCE = (0.06, 0.3, 0.5)  # the same once all nodes around have settled; for a flip, collapse, split
 STRAINED = 0.15  # relative deviation of a member from its desired length above which its nodes ask for moves
 SHORTEST_SPLIT = 1.05  # length of the shortest member that is split [desired length]
+LONGEST_LINE_MEMBER = (
+    1.5  # length from which on a line between two nodes at rest keeps a node between them [desired length]
+)
 LONGEST_COLLAPSED = 1.1  # length of the longest member that is collapsed [desired length]
 SHORTEST_TRIAL_STEP = 0.005  # shortest step that is made in a trial [member lengths]
 
@@ -212,12 +216,25 @@ def is_regular(net: Net, v: int, length: float) -> bool:
 
 
 @kernel
-def is_allowed(net: Net, move: int, a: int, b: int) -> bool:
-    """Whether a move at the edge a-b keeps the topology."""
+def is_last_of_line(net: Net, a: int, b: int, length: float) -> bool:
+    """Whether b is the only node of a line between a and another node at rest, too far from each other for one member."""
+    if not slides_on_line(net, b) or slides_on_line(net, a):
+        return False
+    for i in range(net.degree[b]):
+        c = net.ring[b, i]
+        if c != a and is_line(net, b, c):
+            size = norm(subtract(row(net.nodes, c), row(net.nodes, a))) / target_length(net, a, c, length)
+            return not slides_on_line(net, c) and size > LONGEST_LINE_MEMBER
+    return False
+
+
+@kernel
+def is_allowed(net: Net, move: int, a: int, b: int, length: float) -> bool:
+    """Whether a move at the edge a-b keeps the topology, and leaves no long member in a line, which could not be split."""
     if move == FLIP:
         return may_flip(net, a, b)
     if move == COLLAPSE:
-        return may_collapse(net, a, b)
+        return may_collapse(net, a, b) and not is_last_of_line(net, a, b, length)
     return may_split(net, a, b)
 
 
@@ -232,7 +249,7 @@ def move_at(net: Net, v: int, u: int, way: int, length: float) -> tuple[int, int
         if net.kind[u] == net.kind[v]:
             return NO_MOVE, v, u  # the same as the other collapse: both nodes would come to the middle
         a, b = u, v
-    if not is_allowed(net, move, a, b):
+    if not is_allowed(net, move, a, b, length):
         return NO_MOVE, a, b
     size = norm(subtract(row(net.nodes, b), row(net.nodes, a))) / target_length(net, a, b, length)
     if (move == SPLIT and size < SHORTEST_SPLIT) or (move == COLLAPSE and size > LONGEST_COLLAPSED):

@@ -177,7 +177,7 @@ def is_within(net: Net, area: Area, a: int, b: int) -> bool:
 
 
 @kernel
-def move_at_random(net: Net, patches: np.ndarray, curves: Curves, scratch: Scratch, area: Area) -> int:
+def move_at_random(net: Net, patches: np.ndarray, curves: Curves, scratch: Scratch, area: Area, length: float) -> int:
     """Make some random moves at and around the perturbed node; returns how many."""
     made = 0
     for _ in range(1 + random_choice(area, MOST_RANDOM_MOVES)):
@@ -190,7 +190,7 @@ def move_at_random(net: Net, patches: np.ndarray, curves: Curves, scratch: Scrat
         b = net.ring[a, random_choice(area, net.degree[a])]
         kind = random_choice(area, 5)
         move = FLIP if kind < 3 else (COLLAPSE if kind == 3 else SPLIT)
-        if is_allowed(net, move, a, b) and is_within(net, area, a, b):
+        if is_allowed(net, move, a, b, length) and is_within(net, area, a, b):
             gather(net, scratch, a, b)
             added = make_move(net, patches, curves, scratch, move, a, b)
             if added >= 0:
@@ -290,7 +290,7 @@ def perturb(
         undone is given up too
     """
     before = area_energy(net, patches, scratch, area, length, weight)
-    if move_at_random(net, patches, curves, scratch, area) == 0:
+    if move_at_random(net, patches, curves, scratch, area, length) == 0:
         return False
     for turn in range(SEARCH_ROUNDS):
         forget_trials(scratch, area)

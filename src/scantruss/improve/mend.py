@@ -1,0 +1,123 @@
+"""Poor places: triangles and members that the certificate would refuse, which the search leaves where it may not raise the disorder.
+
+At corners of ridges and at necks no valence is ideal, and the moves that the search tries are too few. Here every flip, collapse and split
+at a poor triangle is tried, and the one that mends most is kept.
+"""
+
+from __future__ import annotations
+
+from itertools import product
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from ..kernels.mesh.figures import angles_of
+from ..kernels.mesh.grid import list_triangles
+from ..kernels.mesh.local_search import COLLAPSE, FLIP, SPLIT, is_allowed, make_move
+from ..kernels.mesh.trial import Scratch, gather, total_energy
+from .equalize import LENGTH_WEIGHT, new_scratch, settle
+from .fixed_nodes import RINGS_SETTLED, nodes_around
+from .working_mesh import WorkingMesh
+
+if TYPE_CHECKING:
+    from ..settings import Settings
+
+POOR_ANGLE_MARGIN = 5.0  # an angle is poor that is not by so much larger than the least allowed [degree]
+POOR_FOLD_MARGIN = 5.0  # two triangles are folded whose angle is not by so much larger than the least allowed [degree]
+POOR_LENGTH_MARGIN = 0.06  # a member is poor that is not by so much within the lengths allowed [desired length]
+MOST_POOR_PLACES = 16  # poor places that are mended at most; where there are more, the whole grid is
+MENDING_ENERGY = 1.5  # most energy that mending a place may cost
+SWEEPS_OF_TRIAL = 8  # sweeps in which the nodes around a move settle
+LEAST_MENDED = 0.02  # least part of a limit by which a move must mend
+
+
+class PoorPlaces(NamedTuple):
+    """What is poor in a grid."""
+
+    faults: float  #: sum of what is missing to the limits, in parts of them
+    worst: np.ndarray  #: (K, 3) int64 the triangles that are poor, the worst first
+
+
+def mend_poor_places(mesh: WorkingMesh, settings: Settings) -> bool:
+    """Mend the triangles and members that the certificate would refuse, where a move and a settling of the nodes around can.
+
+    Returns whether anything has changed.
+    """
+    poor = poor_places(mesh, settings)
+    if not 0 < len(poor.worst) <= MOST_POOR_PLACES:
+        return False
+    scratch, given_up, mended = new_scratch(mesh), set(), False
+    scratch.tried[:] = 1
+    for _ in range(2 * MOST_POOR_PLACES):  # each turn mends a place or gives it up
+        waiting = [t for t in map(tuple, poor.worst.tolist()) if t not in given_up]
+        if not waiting:
+            break
+        if _mend(mesh, scratch, waiting[0], poor, settings):
+            mended = True
+        else:
+            given_up.add(waiting[0])
+        poor = poor_places(mesh, settings)
+    return mended
+
+
+def poor_places(mesh: WorkingMesh, settings: Settings) -> PoorPlaces:
+    """Return the triangles with an angle or a member that is not well within the limits of the settings."""
+    net = mesh.net
+    room = np.empty((int(net.degree[: net.used].sum()) + 1, 3), np.int64)
+    triangles = room[: list_triangles(net, room)]
+    angles = np.empty(triangles.shape)
+    angles_of(net.nodes, triangles, angles)
+    after = np.roll(triangles, -1, axis=1)
+    sizes = np.linalg.norm(net.nodes[after] - net.nodes[triangles], axis=2)
+    sizes /= 0.5 * mesh.length * (net.desired[after] + net.desired[triangles])
+    fixed = mesh.fixed[triangles] & mesh.fixed[after]
+    least, most = settings.min_length + POOR_LENGTH_MARGIN, settings.max_length - POOR_LENGTH_MARGIN
+    off = np.where(fixed, 0.0, np.maximum(1.0 - sizes / least, sizes / most - 1.0))
+    wide = settings.min_angle + POOR_ANGLE_MARGIN
+    flat = 1.0 - fold_angles_of(net.nodes, triangles) / (settings.min_fold + POOR_FOLD_MARGIN)
+    held = np.asarray(mesh.fixed[triangles].all(axis=1))
+    narrow = np.where(held[:, None], 0.0, 1.0 - angles / wide)
+    faults = sum(np.maximum(part, 0.0).sum(axis=1) for part in (off, narrow, flat))
+    order = np.argsort(-faults, kind="stable")[: int((faults > 0.0).sum())]
+    return PoorPlaces(float(faults.sum()), triangles[order])
+
+
+def fold_angles_of(nodes: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Return the angle at each side of triangles (T, 3) to the triangle beyond it (T, 3) [degree]: 180 level and where there is none."""
+    ends = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
+    key = ends.min(axis=1) * len(nodes) + ends.max(axis=1)
+    order = np.argsort(key, kind="stable")
+    same = np.flatnonzero(key[order][1:] == key[order][:-1])
+    sides = np.stack([order[same], order[same + 1]], axis=1)
+    across = np.cross(*(nodes[triangles[:, k]] - nodes[triangles[:, 0]] for k in (1, 2)))
+    across /= np.maximum(np.linalg.norm(across, axis=1), 1e-300)[:, None]
+    cosine = (across[sides[:, 0] // 3] * across[sides[:, 1] // 3]).sum(axis=1)
+    angles = np.full(len(ends), 180.0)
+    angles[sides] = 180.0 - np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))[:, None]
+    return angles.reshape(-1, 3)
+
+
+def _mend(
+    mesh: WorkingMesh, scratch: Scratch, triangle: tuple[int, int, int], poor: PoorPlaces, settings: Settings
+) -> bool:
+    """Make the move at a triangle that mends most; whether one does, else all is as before."""
+
+    def energy() -> float:
+        return float(total_energy(mesh.net, mesh.patches, scratch, mesh.length, LENGTH_WEIGHT)[0])
+
+    start, best, least, most = mesh.copied(), None, poor.faults - LEAST_MENDED, energy() + MENDING_ENERGY
+    pairs = list(zip(triangle, (*triangle[1:], triangle[0]), strict=True))
+    for move, (a, b) in [*product((FLIP, SPLIT), pairs), *product((COLLAPSE,), pairs + [(b, a) for a, b in pairs])]:
+        if not is_allowed(mesh.net, move, a, b, mesh.length):
+            continue
+        gather(mesh.net, scratch, a, b)
+        added = make_move(mesh.net, mesh.patches, mesh.curves, scratch, move, a, b)
+        near = nodes_around(mesh.net, added if added >= 0 else a, RINGS_SETTLED)
+        settle(mesh, LENGTH_WEIGHT, 1e-4, SWEEPS_OF_TRIAL, independent_sets=[near])
+        faults = poor_places(mesh, settings).faults
+        if faults < least and energy() < most:
+            best, least = mesh.copied(), faults
+        mesh.restore(start)
+    if best is not None:
+        mesh.restore(best)
+    return best is not None
