@@ -150,6 +150,19 @@ def test_quads_of_a_vault_become_planar_near_the_scan_with_even_members() -> Non
 
 
 @compiled_only
+@pytest.mark.parametrize("cells", ["quad", "hexagon"])
+def test_planar_panels_keep_the_corners(cells: str) -> None:
+    """A wavy rectangle with noise, so that its corners, too, are projected onto the scan before panels become planar."""
+    rng = np.random.default_rng(6)
+    x, y = rng.uniform((-9.0, -7.0), (9.0, 7.0), (30_000, 2)).T
+    grid = made(
+        cells, np.column_stack([x, y, np.sin(x / 3) * np.cos(y / 3) + rng.normal(0, 0.003, len(x))]), planar=True
+    )
+    away = np.linalg.norm(grid.scan_nodes[:, None, :2] - [(a, b) for a in (-9, 9) for b in (-7, 7)], axis=2).min(axis=0)
+    assert away.max() < 0.05 * LENGTHS[cells]
+
+
+@compiled_only
 def test_planar_hexagons_stay_hexagons_where_the_surface_is_a_saddle() -> None:
     points = bowl(False)
     points[:, 2] = 0.03 * (points[:, 0] ** 2 - points[:, 1] ** 2)

@@ -538,6 +538,19 @@ def test_info_says_what_a_length_can_be(place: Path, capsys: pytest.CaptureFixtu
     assert "members of 3:" in capsys.readouterr().out
 
 
+def test_info_tells_the_surface_from_what_outliers_make_of_the_extent(
+    place: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["info", "scan.xyz", "--length", "3"]) == 0
+    assert "without outliers" not in capsys.readouterr().out
+    points = np.loadtxt("scan.xyz")[:, :3]
+    far = points[::200] + np.array([0.0, 0.0, 0.4 * np.ptp(points, axis=0).max()]) * np.arange(1, 41)[:, None] / 20
+    np.savetxt("dirty.xyz", np.concatenate([points, far]))
+    assert main(["info", "dirty.xyz", "--length", "3"]) == 0
+    said = capsys.readouterr().out.split("surface ")[1].split(", without outliers")[0]
+    assert [float(side) for side in said.split(" x ")][:2] == pytest.approx(np.ptp(points, axis=0)[:2], rel=0.02)
+
+
 def test_print_makes_a_watertight_solid_of_a_saved_grid(ready: Path, capsys: pytest.CaptureFixture[str]) -> None:
     import trimesh
 

@@ -158,3 +158,14 @@ def test_members_that_come_closer_than_their_diameters_are_named(
     assert main(words.split()) == 0
     said = capsys.readouterr().out
     assert "pairs of members come closer than their diameters, the most M" in said and "below 30 degrees" in said
+
+
+@pytest.mark.parametrize(("depth", "way"), [("0.15", "larger"), ("3", "smaller")])
+def test_the_warning_of_small_angles_says_which_depth_opens_them(
+    depth: str, way: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    st.write(dome(5, 1.0, unit="m").replace(nodes=dome(5, 1.0).nodes * [1.0, 1.0, 0.01]), "grid.json")
+    words = f"structure grid.json out.json --supports boundary --double-layer {depth} --second-layer same"
+    assert main(words.split()) == 0
+    assert f"; a {way} depth opens them" in capsys.readouterr().out

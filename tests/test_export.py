@@ -131,6 +131,7 @@ def test_json_tells_other_programs_what_follows(tmp_path: Path) -> None:
         ("\udcff", "not JSON"),
         ("[" * 100_000, "not JSON"),
         ('{"format": "scantruss-grid", "format_version": 99}', "newer"),
+        ('{"format": "scantruss-grid"}', "a damaged grid: format_version is missing"),
         ('{"format": "scantruss-grid", "format_version": 1}', "unit is missing"),
     ],
 )

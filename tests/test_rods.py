@@ -11,6 +11,7 @@ from typed import known
 import scantruss as st
 from scantruss.check.distances import boxes_of
 from scantruss.cli.main import main
+from scantruss.cli.shared import box_around
 from scantruss.kernels.surface.rods import spreads_around
 from scantruss.scan.member_length import length_range
 from scantruss.surface.linked_samples import link_samples
@@ -106,6 +107,15 @@ def test_the_command_names_the_pieces_and_how_to_take_one(
     said = "".join(capsys.readouterr())
     assert "piece 2: " in said and "--no-keep-rods --piece 2 takes it alone, --crop box:" in said
     assert said.index("of the scan, ") < said.index("shape quality")
+
+
+@pytest.mark.parametrize("at", [(0.0, 0.0, 0.0), (674521.92, 1206740.08, 627.53), (3.5e6, 5.4e6, -0.02)])
+@pytest.mark.parametrize("margin", [0.004, 0.3, 25.0])
+def test_the_box_of_a_piece_holds_it_and_little_else_wherever_it_lies(at: tuple[float, ...], margin: float) -> None:
+    low = np.array(at)
+    high = low + 100 * margin
+    box = np.reshape([float(word) for word in box_around(low, high, margin).split(",")], (2, 3))
+    assert np.allclose(box, [low - margin, high + margin], rtol=0, atol=0.1 * margin)
 
 
 @pytest.mark.parametrize("length", [1.0, 3.0])

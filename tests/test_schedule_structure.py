@@ -175,6 +175,14 @@ def test_balls_heavier_than_the_structure_allows_for_are_told_with_what_allows_f
     )
 
 
+def test_no_allowance_for_balls_is_advised_that_a_structure_refuses() -> None:
+    heavy = roof(section="CHS21.3x2.6", scale=0.02)
+    made = st.schedule(heavy, st.ScheduleSettings())
+    assert math.fsum(numbers(made.nodes, "mass")) > 2 * heavy.mass
+    (said,) = (line for line in warning_lines(made.warnings) if "balls weigh" in line)
+    assert "--node-allowance" not in said and "structure takes 200% at most" in said
+
+
 def test_what_is_said_twice_is_refused() -> None:
     for values in ({"tube": 60.0}, {"scale": 2.0}, {"unit": "mm"}):
         with pytest.raises(st.InputError, match=f"a structure has a {next(iter(values))} of its own"):

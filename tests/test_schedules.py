@@ -455,7 +455,7 @@ def test_the_command_writes_all_or_nothing(
     for _ in range(2):  # our own are replaced
         assert main(words) == 0
     said = capsys.readouterr().out
-    assert "25 nodes of" in said and "wrote a.xlsx a.csv" in said
+    assert "25 nodes of" in said and "wrote a.xlsx a.csv; " in said and " more tables beside a.csv, as a_*.csv" in said
     assert {kind_of_ours(path) for path in tmp_path.iterdir()} == {"result"}
     assert len(list(tmp_path.glob("a*.csv"))) == 9
     Path("b_nodes.csv").write_text("id,mine\n")

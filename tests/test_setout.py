@@ -238,7 +238,11 @@ def test_the_command_writes_all_or_nothing(
     for _ in range(2):  # our own are replaced
         assert main(words) == 0
     said = capsys.readouterr().out
-    assert "4 supports" in said and "along 2 sections" in said and "wrote a.csv a.xlsx a.dxf a.pdf" in said
+    assert (
+        "4 supports" in said
+        and "along 2 sections" in said
+        and "wrote a.csv a.xlsx a.dxf a.pdf; 5 more tables beside a.csv, as a_" in said
+    )
     assert {kind_of_ours(path) for path in tmp_path.glob("a*")} == {"result"}
     assert len(setout_paths(Path("a.csv"))) == len(list(tmp_path.glob("a*.csv"))) == 6
     book = openpyxl.load_workbook("a.xlsx")

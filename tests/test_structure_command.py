@@ -24,6 +24,7 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     grid = dome(7, 40.0)
     st.write(grid.replace(line_sets=(LineSet("rim", FIXED_LINE, np.arange(7)),)), "grid.json")
     st.write(grid.replace(unit=""), "nounit.json")
+    Path("roof.json").write_text('{"format": "scantruss-structure"}')
     return tmp_path
 
 
@@ -203,7 +204,10 @@ def test_what_is_odd_in_what_was_given_is_said(place: Path, capsys: pytest.Captu
         ("grid.json out.json --unit m", "the grid is in mm, not in m"),
         ("grid.json out.json --section CHS114x5", "no section 'CHS114x5' is known; nearest are CHS114.3x5"),
         ("grid.json out.json --material S350", "no material 'S350' is known; nearest are S355"),
-        ("grid.json out.json --supports fixed", "no supports: the grid has no fixed nodes"),
+        ("grid.json out.json --supports fixed", "the grid has no fixed nodes; give scantruss grid --fixed X,Y,Z, or name others"),
+        ("grid.json out.json --supports N9999", "no supports 'N9999': the nodes are marked N001 to N049"),
+        ("grid.json out.json --supports lowest", "write it as lowest:0.5"),
+        ("grid.json out.json --supports corners+feet.csv", "there is no file feet.csv"),
         ("grid.json out.json --supports line:ring", "no supports: the grid has no line:ring; nearest are line:rim"),
         ("grid.json out.json --supports=", "no supports; name some with --supports: corners"),
         ("grid.json out.json --supports somewhere", "no supports 'somewhere'; name some with --supports: corners, boundary, lowest:H"),
@@ -215,6 +219,8 @@ def test_what_is_odd_in_what_was_given_is_said(place: Path, capsys: pytest.Captu
         ("grid.json out.json --loads snow:1", "the unit is missing: snow, a load on an area, is '1'; write it as 1kN/m2"),
         ("grid.json out.json --loads snow:1kN", "must be a number with one of the units N/m2 kN/m2"),
         ("grid.json out.json --loads snow:nankN/m2", "must be a number"),
+        ("grid.json out.json --loads snow:1,5kN/m2,self", "write snow:1.5kN/m2 with a point, not snow:1,5kN/m2"),
+        ("grid.json out.json --loads slef", "no load 'slef' (did you mean self?); use self"),
         ("grid.json out.json --loads hail:1kN/m2", "no load 'hail:1kN/m2'; use self, cladding:P"),
         ("grid.json out.json --loads wind:1kN/m2:a", "coefficients of wind are numbers"),
         ("grid.json out.json --loads ,", "no loads"),
@@ -237,6 +243,7 @@ def test_what_is_odd_in_what_was_given_is_said(place: Path, capsys: pytest.Captu
         ("grid.json out.abc", " .glb .html .ifc "),
         ("grid.json grid.json", "would overwrite the grid"),
         ("grid.json", "missing OUT"),
+        ("roof.json out.json", "roof.json is a structure; name the grid, saved as .json by scantruss grid"),
         ("no.json out.json", "there is no file no.json"),
     ],
 )  # fmt: skip
@@ -253,7 +260,9 @@ def test_what_cannot_be_used_is_one_line(
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        ("scale = 'big'", "has 'scale' = 'big'"),
+        ("scale = 'big'", "has 'scale' = 'big'; scale needs a number, without quotes"),
+        ("size = 1.5", "size needs a whole number"),
+        ("[[loads]]\nforce = [0, 0, '-1,5kN']\nnodes = 'N001'", "write it with a point, -1.5, not with a comma"),
         ("colour = 1", "has 'colour' = 1; known are"),
         ("suports = 'corners'", "has 'suports' = 'corners' (did you mean supports?)"),
         ("gamma_m0 = 0", "gamma_m0 must be a positive number"),

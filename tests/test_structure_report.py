@@ -173,6 +173,8 @@ def test_what_the_table_on_the_terminal_leaves_out_is_counted(place: Path, capsy
     shown = next(number for number, line in enumerate(said) if line.startswith("and "))
     cases = json.loads(Path("r.json").read_text())["cases"]
     assert said[shown].startswith(f"and {len(cases) - shown + 1} more combinations")
+    warm = next(line.split() for line in said if line.startswith("temperature"))
+    assert warm[1:3] == ["0", "0"]  # nothing is applied, so rounding is no reaction
     assert said[4].split()[0] == "wind" and said[4].endswith("> 1000")
 
 

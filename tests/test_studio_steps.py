@@ -242,3 +242,11 @@ def test_a_grid_does_not_differ_from_itself(roof: Session) -> None:
     assert grid is not None and deviation(grid, grid).max() < 1e-9
     lifted = grid.replace(nodes=grid.nodes + [0.0, 0.0, 0.1])
     assert 0.05 < deviation(lifted, grid).max() <= 0.1 + 1e-9
+
+
+def test_a_fixed_node_off_the_scan_is_not_taken_and_blocks_no_other(roof: Session) -> None:
+    with pytest.raises(st.InputError, match="away from the scan; it must lie within half a member"):
+        roof.fix(((0.0, 0.0, 0.0),))
+    assert len(roof.settings.fixed) == 0
+    roof.fix(((4997.0, 1.0, 3.6),))
+    assert len(done(roof).settings.fixed) == 1

@@ -99,9 +99,12 @@ def _judged(
     if not settings.planar:
         return certified(made.replace(settings=settings), samples, boundary, judged)
     from .planar import make_planar  # needs scipy, which other grids do not load
+    from .stops import at_stops
 
     surface = with_own_scratch(samples.surface)
     lines, length = constraints.lines, settings.length
+    made = at_stops(made, boundary.stops, length)  # or corners, which were projected onto the scan, would slide
+    made = at_stops(made, lines.stops, length, np.unique(made.lines))
     mesh = WorkingMesh.from_grid(made, surface, boundary.curves, boundary.stops, length, lines)
     flat = make_planar(mesh, made)
     flat = flat.replace(deviation=mesh.deviation()[: len(made.nodes)].copy(), desired=made.desired, before=made.quality)
@@ -124,6 +127,6 @@ def with_warning_of_planes(grid: Grid) -> Grid:
         " diagonal off"
     )
     if grid.cells == "quad" and grid.settings is not None and grid.settings.rows != "curvature":
-        words += "; --rows curvature turns the rows to where they can be"
+        words += "; rows along the curvature may be (--rows curvature)"
     warning = Fault("plane", words, first, tuple(others))
     return grid.replace(certificate=replace(grid.certificate, warnings=(*grid.certificate.warnings, warning)))

@@ -39,6 +39,7 @@ NEAR_SCAN, BACK_TO_SCAN = (
 HOLD = 0.93  # share of `FARTHEST_OFF_SCAN` at which a node is held
 BRACED = 0.2  # share of that weight for the ways across panels, which keep them from becoming hollow
 LEAST_LEFT = 0.7  # share of its length that each member keeps
+SHORTEST_LEFT = 0.51  # length to which members may become shorter, more than the certificate asks for [desired lengths]
 WIDEST_IN_ROUND = 178.0  # angle within a panel up to which a round counts [degree]
 HELD_FAST = 1e3  # weight of what does not move
 SET_ASIDE = 1.2  # growth of the coefficient of variation of the lengths up to which a round counts
@@ -71,6 +72,7 @@ def make_planar(mesh: WorkingMesh, grid: Grid) -> Grid:
     braces = _braces(panels)
     spans = np.linalg.norm(nodes[braces[:, 0]] - nodes[braces[:, 1]], axis=1)
     rails = ends[(grid.edge_uses == 1) | grid.edge_on_line]
+    shortest = np.maximum(LEAST_LEFT * lengths, np.minimum(lengths, SHORTEST_LEFT * target[ends].mean(axis=1)))
     most_uneven = max(SET_ASIDE * grid.quality.length_cv, LEAST_VARIATION)
     angles = inner_angles_of(nodes, panels)
     widest = max(WIDEST_IN_ROUND, float(np.nanmax(angles, initial=0.0)) + 1.0)  # those that stay turn a little
@@ -94,7 +96,7 @@ def make_planar(mesh: WorkingMesh, grid: Grid) -> Grid:
         slide_back(mesh, count)
         _bring_back(mesh, count, target)
         bent = _bent(nodes, panels)
-        if bent < least and _is_sound(nodes, grid, widest, most_uneven):
+        if bent < least and _is_sound(nodes, grid, shortest, widest, most_uneven):
             best, least = nodes.copy(), bent
         if least == 0.0:
             break
@@ -102,14 +104,14 @@ def make_planar(mesh: WorkingMesh, grid: Grid) -> Grid:
     return grid.replace(nodes=best)
 
 
-def _is_sound(nodes: np.ndarray, grid: Grid, widest: float, most_uneven: float) -> bool:
-    """Whether members are even and none has become short, and no panel hollow."""
+def _is_sound(nodes: np.ndarray, grid: Grid, shortest: np.ndarray, widest: float, most_uneven: float) -> bool:
+    """Whether members are even and none is too short, and no panel hollow."""
     start, end = grid.edges.T
     sizes = np.linalg.norm(nodes[start] - nodes[end], axis=1)
     angles = inner_angles_of(nodes, grid.panel_table)
     return bool(
         sizes.std() <= most_uneven * sizes.mean()
-        and (sizes / grid.lengths).min(initial=1.0) > LEAST_LEFT
+        and (sizes >= shortest * (1.0 - 1e-9)).all()
         and np.nanmax(angles, initial=0.0) <= widest
     )
 

@@ -40,7 +40,7 @@ def info(values: Namespace) -> None:
     """Print what a scan holds."""
     from ..boundary.find import find_boundary
     from ..report.advice import Advice
-    from ..report.figures import cloud_lines, loop_rows
+    from ..report.figures import cloud_lines, loop_rows, surface_lines
     from ..report.lengths import advice_lines, advice_rows
     from ..report.terminal import Bars, print_lines, print_table
     from ..scan.member_length import check_length, length_range
@@ -67,6 +67,7 @@ def info(values: Namespace) -> None:
             samples, boundary = find_boundary(sample_surface(cloud, settings), settings, progress=bars)
         note_outliers(bars, cloud, settings, "scantruss grid")
         note_layers(bars, cloud, settings)
+    print_lines(surface_lines(cloud, samples))
     field = samples.surface.field
     longest = f" to {words_of_number(settings.length * field.max(), 4)}" if settings.length_field else ""
     print_lines([f"boundaries for members of {settings.length:g}{longest} {cloud.unit}".rstrip() + ":"])

@@ -94,3 +94,13 @@ def result_folder(path: str | Path) -> Path:
     if not os.access(there, os.W_OK | os.X_OK):
         raise FormatError(f"cannot write to {folder}: no permission to write in the folder {there}; choose another")
     return folder
+
+
+def wrote_line(files: dict[Path, int]) -> str:
+    """Say what was written, and how many tables stand beside a .csv; files: how many there are of each place that was named."""
+    beside = [
+        f"; {count - 1} more tables beside {out}, as {out.stem}_*{out.suffix}"
+        for out, count in files.items()
+        if count > 1
+    ]
+    return f"wrote {' '.join(map(str, files))}{''.join(beside)}"

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from ..errors import InputError, words_of_number
 from .grids import add_grid, read_grid_or_structure
-from .outputs import claim, outs_of
+from .outputs import claim, outs_of, wrote_line
 
 if TYPE_CHECKING:
     from ..schedules.records import Schedule, Schedules
@@ -141,10 +141,11 @@ def make_schedule(values: Namespace) -> None:
         what, checked = read_grid_or_structure(values.grid, values.merge, bars)
         bars("schedules", 0.0)
         made = schedule(what, settings, keep_failed=values.keep_failed, checked=checked)
+        files: dict[Path, int] = {}
         for number, out in enumerate(outs):
             bars("write", number / len(outs))
-            write_schedules(made, save.beside(out))
-    print_lines([*schedule_lines(made, settings), f"wrote {' '.join(map(str, outs))}"])
+            files[out] = len(write_schedules(made, save.beside(out)))
+    print_lines([*schedule_lines(made, settings), wrote_line(files)])
 
 
 def schedule_lines(made: Schedules, settings: ScheduleSettings) -> list[str]:
@@ -176,6 +177,7 @@ def mirrored_words(types: Schedule) -> str:
 def warning_lines(warnings: Schedule) -> list[str]:
     """Say of each kind of warning how many there are, and the worst."""
     from ..schedules.clashes import HEAVY_BALLS
+    from ..structure.loads import MOST_ALLOWANCE
 
     lines = []
     for words in dict.fromkeys(warnings["warning"]):
@@ -184,9 +186,14 @@ def warning_lines(warnings: Schedule) -> list[str]:
         value, limit = float(worst or 0), None if given is None else float(given)
         most = f"{words_of_number(value, 4)} {measure}".rstrip() + ("" if at is None else f" at {at}")
         if words == HEAVY_BALLS and limit is not None:
+            way = (
+                f"structure --node-allowance {value / 100:.2f} takes that into account"
+                if value <= 100 * MOST_ALLOWANCE
+                else f"structure takes {MOST_ALLOWANCE:.0%} at most: thinner tubes or longer members make balls lighter beside them"
+            )
             lines.append(
                 f"warning: the balls weigh {value:.0f} % of the members, and the structure was solved with {limit:.0f} % for its nodes;"
-                f" structure --node-allowance {value / 100:.2f} takes that into account"
+                f" {way}"
             )
         elif limit is None:  # what is never carried at all
             lines.append(f"warning: {words}; the greatest is {most}")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from ..errors import InputError
 from .grids import add_grid, read_grid_or_structure
-from .outputs import claim, outs_of
+from .outputs import claim, outs_of, wrote_line
 
 if TYPE_CHECKING:
     from ..setout.make import SettingOut
@@ -98,10 +98,11 @@ def make_setting_out(values: Namespace) -> None:
         if isinstance(what, Truss) and (own := given.keys() & {"supports", "joints", "scale", "unit"}):
             raise InputError(f"a structure has {min(own)} of its own; leave --{min(own)} out")
         made = set_out(what, settings, keep_failed=values.keep_failed, progress=bars)
+        files: dict[Path, int] = {}
         for number, out in enumerate(outs):
             bars("write", number / len(outs))
-            write_setting_out(made, save.beside(out))
-    print_lines([*setout_lines(made), f"wrote {' '.join(map(str, outs))}"])
+            files[out] = len(write_setting_out(made, save.beside(out)))
+    print_lines([*setout_lines(made), wrote_line(files)])
 
 
 def setout_lines(made: SettingOut) -> list[str]:
@@ -121,7 +122,7 @@ def setout_lines(made: SettingOut) -> list[str]:
         if (now := props.tolist()) != before:
             named = " ".join(made.node_marks[k] for k in now[:PROPS_NAMED])
             more = f" and {len(now) - PROPS_NAMED:,} more" if len(now) > PROPS_NAMED else ""
-            lines.append(f"from step {number} on {len(now):,} props: {named}{more}")
+            lines.append(f"from step {number} on {len(now):,} {'prop' if len(now) == 1 else 'props'}: {named}{more}")
         before = now
     if len(made.steps[-1].props):
         lines.append("warning: the whole does not stand by itself; use more supports or rigid joints")

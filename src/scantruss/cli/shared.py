@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from argparse import Namespace
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -11,6 +12,8 @@ from typing import TYPE_CHECKING
 from ..errors import words_of_number
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from ..report.terminal import Bars
     from ..scan.cloud import PointCloud
     from ..scan.stream.thin_scan import Thinned
@@ -140,6 +143,12 @@ def note_layers(bars: Bars, cloud: PointCloud, settings: Settings) -> None:
         )
 
 
+def box_around(low: np.ndarray, high: np.ndarray, margin: float) -> str:
+    """Return the words of `--crop box:` for what lies between two places, and a margin, exact to a tenth of it."""
+    decimals = max(0, math.ceil(1.0 - math.log10(margin)))
+    return ",".join(f"{c:.{decimals}f}" for c in (*low - margin, *high + margin))
+
+
 def note_pieces(bars: Bars, cloud: PointCloud, settings: Settings) -> None:
     """List the pieces of a scan with their sizes, and how to take one alone; nothing if there is only one."""
     from ..surface.samples import sample_surface
@@ -156,7 +165,7 @@ def note_pieces(bars: Bars, cloud: PointCloud, settings: Settings) -> None:
         places = samples.surface.mean[samples.piece == piece] + cloud.origin
         low, high = places.min(axis=0), places.max(axis=0)
         size = " x ".join(words_of_number(side, 3) for side in high - low)
-        box = ",".join(f"{c:.6g}" for c in (*low - samples.surface.radius, *high + samples.surface.radius))
+        box = box_around(low, high, samples.surface.radius)
         bars.note(f"piece {number}: {size}{unit}; {option} {number} takes it alone, --crop box:{box} all in its box")
     if len(large) > MOST_PIECES:
         bars.note(f"and {len(large) - MOST_PIECES} smaller pieces")

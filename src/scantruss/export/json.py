@@ -137,9 +137,16 @@ def read_grid(path: str | Path) -> Grid:
         raise FormatError(f"cannot read {path}: {error.strerror or error}") from None
     except (ValueError, RecursionError):
         raise FormatError(f"{path} is not JSON; a grid saved as .json by scantruss grid is needed") from None
-    if not isinstance(values, dict) or values.get("format") != FORMAT:
+    kind = str(values.get("format")) if isinstance(values, dict) else ""
+    if kind == "scantruss-structure":
+        raise FormatError(
+            f"{path} is a structure; name the grid, saved as .json by scantruss grid, that it was made of"
+        )
+    if not isinstance(values, dict) or kind != FORMAT:
         raise FormatError(f'{path} has no "format": "{FORMAT}"; a grid saved as .json by scantruss grid is needed')
     version = values.get("format_version")
+    if version is None:
+        raise FormatError(f"{path} is a damaged grid: format_version is missing; write it again with scantruss grid")
     if not isinstance(version, int) or not 1 <= version <= FORMAT_VERSION:
         raise FormatError(
             f"{path} has format_version {version!r}, known is up to {FORMAT_VERSION}; read it with a newer ScanTruss"

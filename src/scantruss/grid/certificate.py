@@ -190,7 +190,7 @@ class Certificate:
         said = [
             verdict + (f" (wider limits: {', '.join(self.widened)})" if self.widened else ""),
             "oriented manifold",
-            f"{self.handles} handles" if self.handles else "",
+            f"{self.handles} handle{'s' * (self.handles > 1)}" if self.handles else "",
             "no triangles cut each other",
             f"{self.scan_within_reach:.2%} of the scan and {self.grid_within_reach:.2%} of the triangles within"
             f" {words_of_number(self.reach, 3)} {self.unit}".rstrip(),

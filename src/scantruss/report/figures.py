@@ -18,9 +18,11 @@ if TYPE_CHECKING:
     from ..grid.certificate import Certificate
     from ..grid.grid import Grid
     from ..scan.cloud import PointCloud
+    from ..surface.samples import SurfaceSamples
 
 
 MOST_LINES = 6  # lines of a kind that are named one by one
+OUTLIERS_WIDEN = 0.05  # share of the extent by which outliers make that of all points larger, from which it is told
 
 
 def report_of(grid: Grid, points: int) -> dict[str, Any]:
@@ -131,7 +133,7 @@ def line_lines(grid: Grid) -> list[str]:
     for kind in (FIXED_LINE, RIDGE):
         sets = sets_of(grid, kind)
         each = [
-            f"{line['name']} {len(line['nodes'])} nodes, {words_of_number(line['length'], 4)}{unit}"
+            f"{line['name']} of {len(line['nodes'])} nodes, {words_of_number(line['length'], 4)}{unit}"
             for line in sets[:MOST_LINES]
         ]
         each += [f"and {len(sets) - MOST_LINES} more"] * (len(sets) > MOST_LINES)
@@ -240,6 +242,15 @@ def cloud_lines(cloud: PointCloud) -> list[str]:
     else:
         lines.append(f"length   {low:g} to {high:g}{unit}")
     return lines
+
+
+def surface_lines(cloud: PointCloud, samples: SurfaceSamples) -> list[str]:
+    """Return the extent of the surface, in words, where outliers make that of the points larger."""
+    sides, of_points = np.ptp(samples.measured_points, axis=0), np.ptp(cloud.points, axis=0)
+    if (of_points - sides).max() < OUTLIERS_WIDEN * of_points.max():
+        return []
+    unit = f" {cloud.unit}" if cloud.unit else ""
+    return [f"surface {' x '.join(words_of_number(side, 4) for side in sides)}{unit}, without outliers"]
 
 
 def loop_rows(boundary: Boundary) -> list[tuple[str, ...]]:

@@ -51,9 +51,11 @@ class LayerChecks:
             )
         if len(self.sharp):
             a, b = self.sharp[int(self.angles.argmin())].tolist()
+            steep = np.isin(self.sharp, _webs(truss)).all(axis=1).mean() > 0.5  # webs against webs, not against chords
             said.append(
                 f"{len(self.sharp):,} angles of webs to other members are below {LEAST_WEB_ANGLE:g} degrees, the least"
-                f" {self.angles.min():.3g} between {truss.member_marks[a]} and {truss.member_marks[b]}"
+                f" {self.angles.min():.3g} between {truss.member_marks[a]} and {truss.member_marks[b]};"
+                f" a {'smaller' if steep else 'larger'} depth opens them"
             )
         if len(self.shallow) and truss.layers is not None:
             named = "; ".join(
@@ -68,13 +70,19 @@ class LayerChecks:
         return said
 
 
+def _webs(truss: Truss) -> np.ndarray:
+    """Return the ids of the webs."""
+    return np.concatenate(
+        [np.zeros(0, np.int64), *(ids for name, ids in truss.member_sets.items() if name.startswith(WEB))]
+    )
+
+
 def check_layers(truss: Truss) -> LayerChecks:
     """Return what is hard or impossible to build of a double layer."""
     around = [s.width if s.shape == "CHS" else float(np.hypot(s.width, s.depth)) for s in truss.sections]
     clashes, clearances = close_pairs(truss.nodes, truss.members, np.array(around)[truss.section_of] / 2)
     pairs, angles = angles_at_nodes(truss.nodes, truss.members)
-    webs = [ids for name, ids in truss.member_sets.items() if name.startswith(WEB)]
-    sharp = (angles < LEAST_WEB_ANGLE) & np.isin(pairs, np.concatenate([np.zeros(0, np.int64), *webs])).any(axis=1)
+    sharp = (angles < LEAST_WEB_ANGLE) & np.isin(pairs, _webs(truss)).any(axis=1)
     return LayerChecks(clashes, clearances, pairs[sharp], angles[sharp], _shallow(truss))
 
 

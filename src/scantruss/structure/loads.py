@@ -27,9 +27,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, did_you_mean
 from .areas import LoadedAreas, loaded_areas
-from .quantities import FORCE, FORCE_PER_LENGTH, LENGTH, PRESSURE, TEMPERATURE, quantity
+from .quantities import FORCE, FORCE_PER_LENGTH, LENGTH, PRESSURE, TEMPERATURE, quantity, split_loads
 from .supports import support_nodes
 from .truss import Combination, LoadCase
 
@@ -42,6 +42,8 @@ VARIABLE_FACTOR = 1.5  #: of variable actions: EN 1990 table A1.2(B)
 COMPANION = {"variable": 0.7, "snow": 0.5, "wind": 0.6, "temperature": 0.6}
 ACTIONS = ("permanent", *COMPANION)
 ON_AREAS = ("cladding", "snow", "half-snow", "wind")
+MOST_ALLOWANCE = 2  #: weight of the nodes over that of the members; more is a share that was meant in percent
+LOAD_NAMES = ("self", "cladding", "snow", "half-snow", "wind", "temperature")
 LOAD_WORDS = "self, cladding:P, snow:P, half-snow:P, wind:P:C, temperature:T"
 ONCE = ("self", "snow", "temperature")  #: loads of which a second one is a slip
 HALF_SNOW_DIRECTIONS = (
@@ -62,9 +64,11 @@ def cases_of(truss: Truss, loads: str | Sequence[Any], node_allowance: float = 0
     InputError
         A load cannot be understood, has no unit or acts on an area where there is none.
     """
-    if not 0 <= node_allowance <= 2:
-        raise InputError(f"node_allowance is a share of the members' weight, 0 to 2, got {node_allowance!r}")
-    given = [word for word in loads.split(",") if word.strip()] if isinstance(loads, str) else list(loads)
+    if not 0 <= node_allowance <= MOST_ALLOWANCE:
+        raise InputError(
+            f"node_allowance is a share of the members' weight, 0 to {MOST_ALLOWANCE}, got {node_allowance!r}"
+        )
+    given = split_loads(loads) if isinstance(loads, str) else list(loads)
     words = [str(load).strip().partition(":")[0] for load in given if not isinstance(load, LoadCase | Mapping)]
     for name in ONCE:
         if words.count(name) > 1:
@@ -152,7 +156,9 @@ def _of_words(truss: Truss, words: str, node_allowance: float) -> list[LoadCase]
         change = quantity(rest, TEMPERATURE, "a change of temperature")
         return [LoadCase("temperature", "temperature", temperature=np.full(len(truss.members), change))]
     if name not in ON_AREAS:
-        raise InputError(f"no load {words!r}; use {LOAD_WORDS} with units, as in snow:1kN/m2, or a file")
+        raise InputError(
+            f"no load {words!r}{did_you_mean(name, LOAD_NAMES)}; use {LOAD_WORDS} with units, as in snow:1kN/m2, or a file"
+        )
     rest, at, direction = rest.partition("@")
     pressure, _, coefficient = rest.partition(":")
     if at and name not in ("half-snow", "wind"):

@@ -17,10 +17,12 @@ from .checks import MemberChecks
 from .groups import WAYS_TO_GROUP
 from .imperfections import check_imperfection
 from .nonlinear import PATH_STEPS
+from .quantities import split_loads
 from .truss import HELD_LAYERS, Combination
 
 MOST_PATH_STEPS = 1000  #: of a nonlinear path
 MOST_MODES = 50  #: of buckling or vibration
+WHOLE_NUMBERS = ("size", "buckling", "frequencies", "path_steps")
 NUMBERS = (
     "scale",
     "node_allowance",
@@ -107,13 +109,17 @@ def read_structure_settings(path: str | Path) -> StructureSettings:
             given[name] = loads_of_words(value) if isinstance(value, str) else tuple(value)
         elif name in ("scale", "node_allowance", "path_factor") and isinstance(value, int | float):
             given[name] = float(value)
-        elif name in ("size", "buckling", "frequencies", "path_steps") and isinstance(value, int):
+        elif name in WHOLE_NUMBERS and isinstance(value, int):
             given[name] = value
         elif name in known and isinstance(value, str | int | float) and name not in NUMBERS:
             given[name] = str(value)
         else:
             names = sorted(known | check_names | {"combinations"})
-            guess = "" if name in names else did_you_mean(name, names)
+            if name in names:
+                whole = name in WHOLE_NUMBERS
+                needed = f"a {'whole ' * whole}number, without quotes" if name in NUMBERS else "one word or number"
+                raise InputError(f"{path} has {name!r} = {value!r}; {name} needs {needed}")
+            guess = did_you_mean(name, names)
             raise InputError(f"{path} has {name!r} = {value!r}{guess}; known are {' '.join(names)}")
     return StructureSettings(**given, checks=MemberChecks(**checks))
 
@@ -162,13 +168,13 @@ def _toml(value: Any) -> str:
 def loads_of_words(words: str) -> tuple[Any, ...]:
     """Return loads of the command line: words with commas between them, files among them with all that they hold."""
     found: list[Any] = []
-    for word in (each.strip() for each in words.split(",")):
+    for word in split_loads(words):
         if Path(word).suffix.lower() in (".toml", ".json"):
             values = _read_table(word)
             if not isinstance(values.get("loads"), list) or not values["loads"]:
                 raise FormatError(f"{word} holds no list of loads; it needs [[loads]] tables")
             found += values["loads"]
-        elif word:
+        else:
             found.append(word)
     return tuple(found)
 

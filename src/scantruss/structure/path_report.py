@@ -86,7 +86,9 @@ def draw_path(axes: Any, path: Path) -> None:
         axes.plot(moves[end - 1 :], path.factors[end - 1 :], "--o", color="#b03a2e", markersize=3, label="beyond")
         axes.plot(moves[end - 1], path.factors[end - 1], "o", color="#b03a2e", markersize=9, markerfacecolor="none")
         words = f"{path.kind} {path.limit_factor:.4g}"
-        axes.annotate(words, (moves[end - 1], path.factors[end - 1]), (0, 10), textcoords="offset points", ha="center")
+        at_right = moves[end - 1] > 0.5 * (moves.min() + moves.max())  # the words stay within the axes
+        side = "right" if at_right else "left"
+        axes.annotate(words, (moves[end - 1], path.factors[end - 1]), (0, 10), textcoords="offset points", ha=side)
     axes.margins(y=0.12)
     axes.legend(fontsize=9)
 

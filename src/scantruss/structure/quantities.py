@@ -14,6 +14,19 @@ FORCE_PER_LENGTH = {f"{name}/m": value for name, value in FORCE.items()} | {"N/m
 TEMPERATURE = {"C": 1.0, "K": 1.0}  #: of a change [K]
 
 
+def split_loads(words: str) -> list[str]:
+    """Return the loads between commas of "self,snow:1kN/m2".
+
+    Raises
+    ------
+    InputError
+        A comma stands within a number.
+    """
+    if comma := re.search(r"([^,:@/]*[:@/][-+]?\d+),(\d+[^,]*)", words):
+        raise InputError(f"a comma divides loads; write {comma[1]}.{comma[2]} with a point, not {comma[0]}")
+    return [word.strip() for word in words.split(",") if word.strip()]
+
+
 def quantity(text: object, units: dict[str, float], what: str, *, plain: bool = False) -> float:
     """Return the value of "0.5kN/m2" in SI units.
 
@@ -31,6 +44,10 @@ def quantity(text: object, units: dict[str, float], what: str, *, plain: bool = 
     InputError
         No number, no unit, or one of another kind.
     """
+    if plain_comma := re.match(r"\s*([-+]?\d+),(\d+)", str(text)):
+        raise InputError(
+            f"{what} is {text!r}; write it with a point, {plain_comma[1]}.{plain_comma[2]}, not with a comma"
+        )
     found = re.fullmatch(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(\S*)\s*", str(text))
     example = next(reversed(units)) if "kN/m2" not in units else "kN/m2"
     if found:

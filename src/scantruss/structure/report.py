@@ -256,8 +256,7 @@ def structure_lines(report: StructureReport) -> list[tuple[str, ...]]:
     return [
         (
             case.name,
-            words_of_number(case.applied[2] / 1e3, 4),
-            words_of_number(case.reactions[2] / 1e3, 4),
+            *(_kilonewtons(force, case) for force in (case.applied[2], case.reactions[2])),
             words_of_number(1e3 * case.displacement_max, 3),
             words_of_number(case.force_min / 1e3, 4),
             words_of_number(case.force_max / 1e3, 4),
@@ -267,12 +266,21 @@ def structure_lines(report: StructureReport) -> list[tuple[str, ...]]:
     ]
 
 
+def _kilonewtons(force: float, case: CaseFigures) -> str:
+    """Return a force of a case for a table; 0 where it is rounding beside the forces in the members."""
+    rounding = 1e-9 * max(abs(case.force_min), abs(case.force_max))
+    return words_of_number(force / 1e3, 4) if abs(force) > rounding else "0"
+
+
 def unlisted_lines(report: StructureReport) -> list[str]:
     """Return a line on how many combinations `structure_lines` leaves out; nothing where it has all."""
     more = len(report.cases) - len(structure_lines(report))
-    return [f"and {more:,} more combination{'s' * (more > 1)}, which use the members or move the nodes less"] * (
-        more > 0
+    which = (
+        "combinations, which use the members or move the nodes"
+        if more > 1
+        else "combination, which uses the members or moves the nodes"
     )
+    return [f"and {more:,} more {which} less"] * (more > 0)
 
 
 def half_lines(report: StructureReport) -> list[str]:
@@ -282,9 +290,10 @@ def half_lines(report: StructureReport) -> list[str]:
         return []
     moved = max(part_loaded, key=lambda case: case.displacement_max)
     used = max(part_loaded, key=lambda case: case.utilization_max or 0.0)
-    most = f", {used.name} uses the members most, {use_words(used.utilization_max)}" if used.utilization_max else ""
+    which = "and" if used is moved else f"and {used.name}"
+    most = f", {which} uses the members most, {use_words(used.utilization_max)}" if used.utilization_max else ""
     return [
-        f"of {len(part_loaded)} cases of half the snow {moved.name} moves the nodes most, {1e3 * moved.displacement_max:.3g} mm{most}"
+        f"of {len(part_loaded)} cases with half the snow, {moved.name} moves the nodes most, {1e3 * moved.displacement_max:.3g} mm{most}"
     ]
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from contextlib import suppress
 from difflib import get_close_matches
 from typing import TYPE_CHECKING
@@ -18,7 +19,11 @@ if TYPE_CHECKING:
     from .truss import Truss
 
 SUPPORT_TURN = 45.0  #: least turn of the boundary, seen over two members to either side, at a corner [degree]
+SHARP_TURN = (
+    40.0  #: least turn at one node, seen over one member and over two, that makes it a corner beside others [degree]
+)
 SUPPORT_WAYS = "corners, boundary, lowest:H, fixed, line:NAME, loop:N"
+OTHER_WAYS = f"name others with --supports: {SUPPORT_WAYS}, a node such as N001 or a file of positions"
 SUPPORT_WORDS = ("corners", "boundary", "fixed")  #: of these, those without a value
 HELD = {"pinned": (math.inf,) * 3 + (0.0,) * 3, "fixed": (math.inf,) * 6, "roller": (0.0, 0.0, math.inf, 0.0, 0.0, 0.0)}
 
@@ -92,7 +97,11 @@ def _nodes_of(truss: Truss, word: str) -> np.ndarray:
     with suppress(KeyError):
         if len(nodes := truss.node_sets[word]):
             return nodes
-        raise InputError(f"no supports: the grid has no {'fixed nodes' if word == 'fixed' else word}")
+        if word == "fixed":
+            raise InputError(
+                f"no supports: the grid has no fixed nodes; give scantruss grid --fixed X,Y,Z, or {OTHER_WAYS}"
+            )
+        raise InputError(f"no supports: the grid has no {word}; {OTHER_WAYS}")
     names = [name for name in truss.node_sets if name.startswith(("line:", "loop:"))]
     if word in ("corners", "boundary"):
         raise InputError(f"no supports: the grid is closed and has no {word}; use lowest:H or fixed nodes")
@@ -100,7 +109,16 @@ def _nodes_of(truss: Truss, word: str) -> np.ndarray:
         near = get_close_matches(word, names, 3, 0.0)
         raise InputError(f"no supports: the grid has no {word}; nearest are {' '.join(near)}")
     if word.startswith("line:"):
-        raise InputError(f"no supports: the grid has no lines, so no {word}")
+        raise InputError(f"no supports: the grid has no lines, so no {word}; {OTHER_WAYS}")
+    if word == "lowest":
+        raise InputError(
+            "no supports: lowest needs a height above the lowest node, in metres or with a unit; write it as lowest:0.5"
+        )
+    if re.fullmatch(r"[Nn]?\d+", word):
+        marks = truss.node_marks
+        raise InputError(f"no supports {word!r}: the nodes are marked {marks[0]} to {marks[-1]}")
+    if re.search(r"[/\\]|\.[A-Za-z]{1,5}$", word):
+        raise InputError(f"no supports: there is no file {word}; it needs positions X,Y,Z, one a line")
     raise InputError(
         f"no supports {word!r}{did_you_mean(word, (*SUPPORT_WORDS, *truss.node_sets))}; name some with --supports:"
         f" {SUPPORT_WAYS}, a node such as N001 or a file of positions"
@@ -113,11 +131,17 @@ def _length(points: np.ndarray) -> float:
 
 
 def _corners(nodes: np.ndarray, loop: np.ndarray) -> np.ndarray:
-    """Return the nodes at which a loop turns most, each the greatest turn within two members."""
-    points = nodes[loop]
-    before, after = points - np.roll(points, 2, axis=0), np.roll(points, -2, axis=0) - points
-    product = np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1)
-    cosine = (before * after).sum(axis=1) / np.maximum(product, 1e-300)
-    turn = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
-    around = np.max([np.roll(turn, step) for step in (-2, -1, 1, 2)], axis=0)
-    return loop[(turn > SUPPORT_TURN) & (turn >= around - 1e-6)]
+    """Return where a loop turns sharply, so both ends of a narrow foot, and else the greatest turn within two members."""
+    (near, axis), (far, _) = (_turns(nodes[loop], members) for members in (1, 2))
+    sharp = np.minimum(near, far) > SHARP_TURN
+    for step in (-1, 1):  # turning back at once is a zigzag
+        sharp &= ~((np.roll(near, step) > SHARP_TURN) & ((axis * np.roll(axis, step, axis=0)).sum(axis=1) < 0))
+    around, sharp_around = (np.max([np.roll(each, step) for step in (-2, -1, 1, 2)], axis=0) for each in (far, sharp))
+    return loop[sharp | ((far > SUPPORT_TURN) & (far >= around - 1e-6) & ~sharp_around)]
+
+
+def _turns(points: np.ndarray, members: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return by how much a closed polyline turns at each point, over so many members to either side [degree], and about which axes."""
+    before, after = points - np.roll(points, members, axis=0), np.roll(points, -members, axis=0) - points
+    axis = np.cross(before, after)
+    return np.degrees(np.arctan2(np.linalg.norm(axis, axis=1), (before * after).sum(axis=1))), axis

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..constraints.fixed_nodes import check_positions
 from ..errors import InputError
 from ..export.model import Model
 from ..pipeline import grid_from_cloud
@@ -17,6 +18,7 @@ from ..scan.cloud import PointCloud
 from ..scan.member_length import exact_range
 from ..settings import Settings
 from ..structure.options import loads_of_words
+from ..surface.samples import sample_surface
 from .compare import kept_design
 from .features import Feature, find_features, switched_off
 from .outputs import command_of, files_of, model_to_show
@@ -142,7 +144,18 @@ class Session(ScanSteps):
         self.set(f"{'hole' if feature.kind == 'fill_at' else 'ridge'} {number + 1}", **{feature.kind: left})
 
     def fix(self, places: tuple[tuple[float, ...], ...], words: str = "fixed node") -> None:
-        """Take the positions that must become nodes, in the frame of the scan [scan unit]."""
+        """Take the positions that must become nodes, in the frame of the scan [scan unit].
+
+        Raises
+        ------
+        InputError
+            A new one is farther than half a member from the scan; it is not taken, for no grid could be made with it.
+        """
+        length = self.settings.length
+        if self.cloud is not None and length and not self.settings.length_field:
+            kept = {tuple(place) for place in self.settings.fixed}
+            new = [place for place in places if place not in kept]
+            check_positions(new, sample_surface(self.cloud, self.settings), length)
         self.set(words, fixed=places)
 
     # ---- the structure
