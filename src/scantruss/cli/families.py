@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from argparse import Namespace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..errors import InputError
 from .outputs import claim, outs_of
 
 if TYPE_CHECKING:
+    from ..boundary.find import Boundary
     from ..grid.grid import Grid
+    from ..settings import Settings
+    from ..surface.samples import SurfaceSamples
     from .options import Parser
 
 
@@ -39,7 +42,11 @@ def families_parser() -> Parser:
     parser.add_argument(
         "--report", metavar="FILE", help="families with their members, and lengths before and after, .json"
     )
-    parser.add_argument("--plot", metavar="FILE.png", help="number of lengths against the largest misfit")
+    parser.add_argument(
+        "--plot",
+        metavar="FILE.png",
+        help="number of lengths against the largest misfit, and with --scan against the distance from it",
+    )
     parser.add_argument(
         "--keep-failed", action="store_true", help="also take and write a grid that fails its certificate"
     )
@@ -75,36 +82,65 @@ def families(values: Namespace) -> None:
         check_passed(before, values.keep_failed)
         bars("families", 0.1)
         found = few_lengths(before, values.tolerance, values.count)
-        made = _certified(before, found.grid, values) if values.scan else found.grid
+        scan = _Scan.of_grid(before, values) if values.scan else None
+        made = scan.certified(found.grid, keep_failed=values.keep_failed) if scan else found.grid
         figures = family_report(before, found, values.tolerance)
         wrote = write_models(model_of_grid(made), outs, save, bars)
         if report is not None:
             save.json(report, figures)
         if plot is not None:
-            save.beside(plot).write_bytes(encode_families(before, values.tolerance))
+            save.beside(plot).write_bytes(
+                encode_families(before, values.tolerance, off_scan=scan and scan.farthest_node)
+            )
     wrote += [place for place in (report, plot) if place is not None]
     print_lines([*_words(figures, values), f"wrote {' '.join(map(str, wrote))}"])
 
 
-def _certified(before: Grid, made: Grid, values: Namespace) -> Grid:
-    """Return the grid with a certificate of the scan."""
-    from ..boundary.find import find_boundary
-    from ..cells.make import judging_settings, settings_of_triangles
-    from ..check.certify import certify
-    from ..grid.certificate import check_passed
-    from ..scan.formats.reading import read_points
-    from ..surface.samples import sample_surface
+class _Scan(NamedTuple):
+    """The scan that a grid is compared with."""
 
-    if (settings := before.settings) is None:
-        raise InputError(f"{values.grid} does not say with which settings it was made; leave --scan out")
-    cloud = read_points(values.scan, settings.unit, settings.selection)
-    plain = settings_of_triangles(settings)
-    samples, boundary = find_boundary(sample_surface(cloud, plain), plain)
-    moved = made.replace(nodes=made.nodes + (made.origin - samples.origin), origin=samples.origin)
-    certificate = certify(moved, samples, boundary, judging_settings(settings))
-    moved = moved.replace(certificate=certificate)
-    check_passed(moved, values.keep_failed)
-    return moved
+    samples: SurfaceSamples
+    boundary: Boundary
+    settings: Settings
+
+    @classmethod
+    def of_grid(cls, grid: Grid, values: Namespace) -> _Scan:
+        """Read the scan with the settings of a grid."""
+        from ..boundary.find import find_boundary
+        from ..cells.make import settings_of_triangles
+        from ..scan.formats.reading import read_points
+        from ..surface.samples import sample_surface
+
+        if (settings := grid.settings) is None:
+            raise InputError(f"{values.grid} does not say with which settings it was made; leave --scan out")
+        cloud = read_points(values.scan, settings.unit, settings.selection)
+        plain = settings_of_triangles(settings)
+        return cls(*find_boundary(sample_surface(cloud, plain), plain), settings)
+
+    def at_scan(self, grid: Grid) -> Grid:
+        """Return a grid with the origin of the scan."""
+        return grid.replace(nodes=grid.nodes + (grid.origin - self.samples.origin), origin=self.samples.origin)
+
+    def certified(self, grid: Grid, *, keep_failed: bool) -> Grid:
+        """Return a grid with a certificate of the scan."""
+        from ..cells.make import judging_settings
+        from ..check.certify import certify
+        from ..grid.certificate import check_passed
+
+        moved = self.at_scan(grid)
+        certificate = certify(moved, self.samples, self.boundary, judging_settings(self.settings))
+        moved = moved.replace(certificate=certificate)
+        check_passed(moved, keep_failed)
+        return moved
+
+    def farthest_node(self, grid: Grid) -> float:
+        """Return the largest distance of a node of a grid from the scan [unit of the grid]."""
+        import numpy as np
+
+        from ..check.distances import distances_to_points
+
+        _, nodes, _ = distances_to_points(self.at_scan(grid), self.samples, self.settings.length)
+        return float(np.nanmax(nodes))
 
 
 def _words(figures: dict[str, Any], values: Namespace) -> list[str]:
