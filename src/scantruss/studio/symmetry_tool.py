@@ -1,4 +1,4 @@
-"""Symmetry: mirror planes that the grid keeps exactly, found in the scan or typed."""
+"""Symmetry: mirror planes or the rotation that the grid keeps exactly, found in the scan or typed."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..settings.values import ROTATION_NUMBERS, SYMMETRIES_FOUND
 from .drawn_lines import numbers_of
 from .frame import DRAWN_EXTENT, SceneFrame
 
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 
 PLANE_COLOR = (90, 120, 200)
 PLANE_REACH = 0.6  #: of a plane that is drawn, from its middle [extent of the scan]
-SYMMETRIES = ("none", "auto", "typed")
+SYMMETRIES = ("none", *SYMMETRIES_FOUND, "typed")
 
 
 class SymmetryTool:
@@ -24,23 +25,28 @@ class SymmetryTool:
     def __init__(self, view: StudioView, gui: Any) -> None:
         self.view = view
         self.way = gui.add_dropdown(
-            "planes", SYMMETRIES, hint="auto finds them in the scan; typed takes the plane below"
+            "planes",
+            SYMMETRIES,
+            hint="auto finds planes in the scan, else a rotation; rotation finds that only; typed takes what is below",
         )
         self.words = gui.add_text(
-            "plane", "", hint="x, y, z, nx, ny, nz: a point and a normal, in the frame of the scan"
+            "plane",
+            "",
+            hint="x, y, z, nx, ny, nz: a point and a normal, in the frame of the scan; or a point, an axis and the parts of a turn",
         )
         self._count = 0
         self.way.on_update(view.step(self._set))
-        self.words.on_update(view.typed(lambda: self._set() if self.way.value == SYMMETRIES[2] else None))
+        self.words.on_update(view.typed(lambda: self._set() if self.way.value == SYMMETRIES[-1] else None))
 
     def _set(self) -> None:
         way, session = self.way.value, self.view.session
         plane: Any = "" if way == SYMMETRIES[0] else way
-        if way == SYMMETRIES[2]:
+        if way == SYMMETRIES[-1]:
             if not self.words.value.strip():
                 self.view.say("type a plane: x, y, z, nx, ny, nz")
                 return
-            plane = (numbers_of(self.words.value, 6, "a mirror plane needs a point and a normal, six numbers"),)
+            count = ROTATION_NUMBERS if len(self.words.value.split(",")) == ROTATION_NUMBERS else 6
+            plane = (numbers_of(self.words.value, count, "a mirror plane needs a point and a normal, six numbers"),)
         if plane != session.settings.symmetry:
             session.set("symmetry", symmetry=plane)
 
@@ -48,13 +54,14 @@ class SymmetryTool:
         """Show the planes of a state."""
         asked = state.settings.symmetry
         if before is None or before.settings.symmetry != asked:
-            self.way.value = asked if asked == "auto" else SYMMETRIES[2 if asked else 0]
+            self.way.value = asked if asked in SYMMETRIES_FOUND else SYMMETRIES[-1 if asked else 0]
             if asked and not isinstance(asked, str):
                 self.words.value = ", ".join(f"{number:.7g}" for number in asked[0])
         if before is not None and before.grid is state.grid and before.cloud is state.cloud:
             return
         made = state.grid.settings if state.grid is not None else None
-        planes = made.symmetry if made is not None and not isinstance(made.symmetry, str) else ()
+        rows = made.symmetry if made is not None and not isinstance(made.symmetry, str) else ()
+        planes = [row for row in rows if len(row) != ROTATION_NUMBERS]
         self.view.scene.remove(*(f"/mirror/{k}" for k in range(self._count)))
         self._count = len(planes)
         for k, plane in enumerate(planes):
