@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from small_grids import dome, make_grid
+from small_grids import dome, make_grid, uneven
 
 import scantruss as st
 from scantruss.cli.main import main
@@ -14,16 +14,6 @@ from scantruss.errors import InputError
 from scantruss.layouts import families
 from scantruss.layouts.charts import Charts
 from scantruss.layouts.families import least_misfit, lengths_needed
-
-
-def uneven(count: int = 8) -> st.Grid:
-    """A dome whose inner nodes are not quite where they should be."""
-    grid = dome(count, 4.0, unit="m")
-    inner = np.ones(len(grid.nodes), bool)
-    inner[np.concatenate(grid.boundary_loops)] = False
-    x = grid.nodes + 0.15 * inner[:, None] * np.random.default_rng(5).standard_normal(grid.nodes.shape) * [1, 1, 0]
-    x[:, 2] = 0.3 * grid.nodes[:, 0].max() - 0.3 * (x[:, 0] ** 2 + x[:, 1] ** 2) / grid.nodes[:, 0].max()
-    return grid.replace(nodes=x)
 
 
 @pytest.mark.parametrize("share", [0.6, 0.95, 1.0])

@@ -54,6 +54,10 @@ class Charts:
         rise = np.stack([2 * a * u + b * v, b * u + 2 * c * v], axis=1)
         return np.asarray((self.frames[:, :2] + rise[:, :, None] * self.frames[:, 2:]) * self.free[:, :, None])
 
+    def place_of(self, nodes: np.ndarray) -> np.ndarray:
+        """Return by how much nodes (V, 3) have moved along what is free (V, 2)."""
+        return np.asarray(np.einsum("vkc,vc->vk", self.frames[:, :2], nodes - self.nodes) * self.free)
+
     def within(self, place: np.ndarray) -> np.ndarray:
         """Return moves (V, 2) none of which is farther than is allowed."""
         return shortened(place, FARTHEST_MOVE * self.mean)
@@ -108,6 +112,10 @@ def _lay_along(three: np.ndarray, frame: np.ndarray, quadric: np.ndarray) -> flo
     size = float(np.linalg.norm(bend))
     if size > 1e-12 / (s + t):
         frame[2] = bend / size
+    else:
+        frame[2] -= (frame[2] @ frame[0]) * frame[0]
+        frame[2] /= np.linalg.norm(frame[2])
+    frame[1] = np.cross(frame[2], frame[0])
     quadric[:] = size, 0.0, 0.0
     return math.degrees(math.acos(min(1.0, max(-1.0, float(back @ on) / (s * t)))))
 

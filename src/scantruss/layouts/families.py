@@ -14,6 +14,7 @@ from ..errors import InputError
 from ..grid.grid import Grid
 from ..grid.panels import triangles_of
 from .charts import Charts, shortened
+from .images import Images
 
 FAMILY_ROUNDS = 300  #: of assignment and relaxation, each way
 INNER_SHARE = 0.9  #: of the tolerance, within which a length is taken to be that of its family
@@ -86,7 +87,7 @@ def few_lengths(grid: Grid, tolerance: float, count: int) -> Families:
     """Return the grid with its nodes moved along its surface so that more members are of `count` lengths.
 
     The surface is a quadric at each node, of least squares through its neighbours and theirs; nodes of the boundary and of lines move along
-    a parabola through the two beside them. Corners, fixed nodes, and ends and crossings of lines stay.
+    a parabola through the two beside them; the symmetry of the grid is kept. Corners, fixed nodes, and ends and crossings of lines stay.
 
     Each round assigns every member to a family and moves the nodes by a damped Gauss-Newton step towards them; members that are in none
     weigh more from round to round. Large families, seven of twelve, are the lengths that hold the most members; they shall hold 95 %. The
@@ -113,16 +114,16 @@ def few_lengths(grid: Grid, tolerance: float, count: int) -> Families:
         raise InputError(f"the number of families must be 1 or more, got {count}")
     if len(grid.edges) == 0 or not grid.topology.manifold:
         raise InputError("families of members need a manifold grid with members")
-    charts, aim = Charts.of_grid(grid), _Number(math.ceil(LARGE_FAMILIES * count), count)
+    charts, images, aim = Charts.of_grid(grid), Images.of_grid(grid), _Number(math.ceil(LARGE_FAMILIES * count), count)
     start = place = np.zeros((len(grid.nodes), 2))
     off = math.inf
     for way in WAYS_TRIED:
-        tried, missed = _relaxed(grid, charts, tolerance, aim, place if way.onwards else start, way)
+        tried, missed = _relaxed(grid, charts, images, tolerance, aim, place if way.onwards else start, way)
         if missed < off:
             place, off = tried, missed
         if not 0 < off < OUT_OF_REACH:
             break
-    nodes = charts.moved(place) if place.any() else grid.nodes
+    nodes = images.alike(charts.moved(place)) if place.any() else grid.nodes
     made = grid.replace(nodes=nodes, deviation=None)
     if made.panels is not None:  # which are cut along their shortest diagonals
         made = made.replace(triangles=triangles_of(nodes, made.panels), panels=made.panels)
@@ -199,7 +200,7 @@ class _Number(NamedTuple):
 
 
 def _relaxed(
-    grid: Grid, charts: Charts, tolerance: float, aim: _Number, place: np.ndarray, way: _Way
+    grid: Grid, charts: Charts, images: Images, tolerance: float, aim: _Number, place: np.ndarray, way: _Way
 ) -> tuple[np.ndarray, float]:
     """Return the places (V, 2) on the charts of the best round, and the share of members by which it misses the aim."""
     width = tolerance * charts.mean
@@ -225,8 +226,9 @@ def _relaxed(
             np.maximum(weight / way.heavier, LEAST_WEIGHT),
         )
         pull = np.sign(off) * np.maximum(np.abs(off) - INNER_SHARE * width, 0)
-        place = _step(grid, charts, place, pull, weight)
-        lengths = _lengths(charts.moved(place), grid.edges)
+        nodes = images.alike(charts.moved(_step(grid, charts, place, pull, weight)))
+        place = charts.place_of(nodes)
+        lengths = _lengths(nodes, grid.edges)
     return best, least
 
 
