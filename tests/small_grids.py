@@ -57,6 +57,16 @@ def dome(count: int = 12, length: float = 4.0, **others: Any) -> Grid:
     return make_grid(nodes, triangles, **others)
 
 
+def uneven(count: int = 8) -> Grid:
+    """A dome whose inner nodes are not quite where they should be."""
+    grid = dome(count, 4.0, unit="m")
+    inner = np.ones(len(grid.nodes), bool)
+    inner[np.concatenate(grid.boundary_loops)] = False
+    x = grid.nodes + 0.15 * inner[:, None] * np.random.default_rng(5).standard_normal(grid.nodes.shape) * [1, 1, 0]
+    x[:, 2] = 0.3 * grid.nodes[:, 0].max() - 0.3 * (x[:, 0] ** 2 + x[:, 1] ** 2) / grid.nodes[:, 0].max()
+    return grid.replace(nodes=x)
+
+
 def rich(**others: Any) -> Grid:
     """A fan with everything a grid can carry."""
     before = GridQuality(0.9, 0.1, 0.5, 9.7, 1 / 3, 0.1, 31.0, 99.0, 0.8, 0.01, 0.02, "mm")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import importlib.util
 import re
 from pathlib import Path
@@ -151,6 +152,17 @@ def test_other_programs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
     assert openpyxl.load_workbook(tmp_path / "stadium.saf.xlsx")["StructuralCurveMember"].max_row == count + 1
     assert len(ezdxf.readfile(tmp_path / "stadium.dxf").modelspace().query("LINE")) == count
     assert "members" in trimesh.load(tmp_path / "stadium.glb").geometry
+
+
+def test_free_grid(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Quads of a barrel are those of freeGrid's baseline: 441 joints of 4 kinds, 840 members of one length."""
+    monkeypatch.syspath_prepend(str(FOLDER))
+    module = importlib.import_module("13_free_grid")
+    found = module.main(tmp_path, ["barrel"], 20_000)["barrel"]
+    assert (len(found.grid.nodes), len(found.grid.edges), len(found.grid.panel_table)) == (441, 840, 400)
+    assert len(found.representative) == 4 and found.grid.quality.length_cv < 0.005
+    assert found.grid.lengths.sum() == pytest.approx(1311, abs=4) and module.planarity(found.grid) < 1.001
+    assert (tmp_path / "barrel.obj").exists()
 
 
 def test_double_layer(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,22 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from small_grids import dome
+from small_grids import dome, make_grid, uneven
 
 import scantruss as st
 from scantruss.cli.main import main
 from scantruss.errors import InputError
+from scantruss.layouts import families
+from scantruss.layouts.charts import Charts
 from scantruss.layouts.families import least_misfit, lengths_needed
-
-
-def uneven(count: int = 8) -> st.Grid:
-    """A dome whose inner nodes are not quite where they should be."""
-    grid = dome(count, 4.0, unit="m")
-    inner = np.ones(len(grid.nodes), bool)
-    inner[np.concatenate(grid.boundary_loops)] = False
-    x = grid.nodes + 0.15 * inner[:, None] * np.random.default_rng(5).standard_normal(grid.nodes.shape) * [1, 1, 0]
-    x[:, 2] = 0.3 * grid.nodes[:, 0].max() - 0.3 * (x[:, 0] ** 2 + x[:, 1] ** 2) / grid.nodes[:, 0].max()
-    return grid.replace(nodes=x)
 
 
 @pytest.mark.parametrize("share", [0.6, 0.95, 1.0])
@@ -60,6 +52,61 @@ def test_more_members_are_of_few_lengths_and_nodes_stay_on_the_surface() -> None
     assert found.moved.max() <= 0.41 * mean and found.misfit == pytest.approx(
         found.grid.lengths - found.lengths[found.of]
     )
+
+
+@pytest.mark.parametrize(("tolerance", "large", "count"), [(0.01, 7, 12), (0.005, 12, 20)])
+def test_large_families_hold_nearly_all_members_and_small_ones_the_rest(
+    tolerance: float, large: int, count: int
+) -> None:
+    grid = uneven(9)
+    width = tolerance * float(grid.lengths.mean())
+    found = st.few_lengths(grid, tolerance, count)
+    for share, few in ((0.95, large), (1.0, count)):
+        assert len(lengths_needed(found.grid.lengths, width, share)) <= few
+        assert len(lengths_needed(grid.lengths, width, share)) > few
+    assert np.abs(found.misfit).max() <= width * (1 + 1e-9)
+
+
+def test_one_member_in_twenty_at_most_is_drawn_to_a_small_family() -> None:
+    lengths = np.random.default_rng(8).normal(1, 0.06, 400)
+    number = families._Number(4, 7)
+    target = families._families_aimed_at(lengths, 0.01, number)
+    large = families._middles(lengths, 0.01, 4, 400)
+    off = np.abs(lengths[:, None] - large).min(axis=1)
+    to_small = ~np.isin(target, large)
+    assert 0 < to_small.sum() <= 20 and (np.abs(lengths - target) <= off + 1e-12).all()
+    assert len(np.unique(target)) <= 7
+
+
+def test_a_small_family_is_where_the_rest_is_nearest() -> None:
+    rest = np.array([0.70, 0.71, 0.72, 1.3])
+    beyond = np.array([10.0, 9.0, 8.0, 3.0])
+    (found,) = families._small_families(rest, 0.01, beyond, 1)
+    costs = {c: (np.minimum(beyond, np.maximum(np.abs(rest - c) / 0.01 - 1, 0)) ** 2).sum() for c in [*rest, found]}
+    assert costs[found] == min(costs.values()) == pytest.approx(9.0)
+    assert families._small_families(rest, 0.01, beyond, 2) == pytest.approx([0.71, 1.3], abs=0.0101)
+
+
+def test_corners_stay_and_round_boundaries_of_few_members_slide() -> None:
+    at = np.arange(25)
+    begin = at[(at < 20) & (at % 5 < 4)]
+    halves = [np.stack([begin, begin + 5, begin + 6], axis=1), np.stack([begin, begin + 6, begin + 1], axis=1)]
+    square = make_grid(np.stack([at // 5, at % 5, 0 * at], axis=1).astype(float), np.concatenate(halves))
+    (loop,) = square.boundary_loops
+    free = Charts.of_grid(square).free
+    assert set(np.flatnonzero(~free[:, 0])) == {0, 4, 20, 24}
+    assert not free[loop, 1].any() and free[np.setdiff1d(at, loop)].all()
+    angle = np.arange(9) * 2 * np.pi / 9
+    ring = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    nodes = np.concatenate([ring, 2 * ring])
+    k = np.arange(9)
+    triangles = np.concatenate(
+        [np.stack([k, k + 9, (k + 1) % 9 + 9], 1), np.stack([k, (k + 1) % 9 + 9, (k + 1) % 9], 1)]
+    )
+    charts = Charts.of_grid(make_grid(nodes, triangles))
+    assert charts.free[:, 0].all() and not charts.free[:, 1].any()
+    along = charts.moved(np.full((18, 2), 0.05) * charts.free)
+    assert np.linalg.norm(along[:9], axis=1) == pytest.approx(np.ones(9), abs=1e-3)
 
 
 def test_equal_members_stay_as_they_are() -> None:

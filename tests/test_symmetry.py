@@ -1,4 +1,4 @@
-"""Mirror planes: found in scans, kept exactly by the grid, refused where there are none."""
+"""Mirror planes and rotations: found in scans, kept exactly by the grid, refused where there are none."""
 
 from pathlib import Path
 
@@ -10,6 +10,7 @@ from scipy.spatial import cKDTree
 import scantruss as st
 from scantruss.cli.main import main
 from scantruss.errors import FrontError, InputError
+from scantruss.scan.rotation import check_rotation, find_rotation, turn_about
 from scantruss.scan.symmetry import check_mirror_planes, find_mirror_planes, nearest_mirror_plane
 
 LENGTH = 12.0  # of members of the vault, 100 long
@@ -119,6 +120,12 @@ def test_the_command_takes_planes_of_a_file(
         Path("shell.settings.json").read_text().split()
     ).replace("[ ", "[").replace(" ]", "]")
     for text, reason in (
+        (
+            "500,-200,0,0,0,1,2\n0,0,0,0,0,1,2",
+            "a rotation stands alone and needs a point, an axis and the parts of a turn, 2 to 12",
+        ),
+        ("500,-200,0,0,0,1,1", "a rotation stands alone and needs a point, an axis and the parts of a turn, 2 to 12"),
+        ("500,-200,0,0,0,1,3", "the scan is not the same when it is turned by 360/3 degrees about the axis"),
         ("500,-200,0", "line 1: a mirror plane needs six numbers"),
         ("0,0,0,0,0,0", "a mirror plane needs a point and a normal"),
         ("", "holds no mirror plane"),
@@ -136,3 +143,58 @@ def test_a_surface_of_revolution_has_three_planes_at_60_degrees() -> None:
     planes = find_mirror_planes(points, 0.1)
     cosines = np.abs(np.array([plane.normal for plane in planes]) @ np.transpose([plane.normal for plane in planes]))
     assert len(planes) == 3 and cosines[np.triu_indices(3, 1)] == pytest.approx(0.5, abs=1e-12)
+
+
+def pinwheel(blades: int = 3, turn: float = 0.0) -> np.ndarray:
+    """A shell with as many waves as blades, each leaning the same way round, that has no mirror plane; away from the origin."""
+    radius, angle = (
+        each.ravel()
+        for each in np.meshgrid(np.sqrt(np.linspace(0.0, 1.0, 110)), np.linspace(0, 2 * np.pi, 330, endpoint=False))
+    )
+    x = 50 * radius * np.cos(angle + turn)
+    y = 50 * radius * np.sin(angle + turn)
+    z = 14 * (1 - radius**2) + 5 * radius**2 * np.sin(blades * angle + 2.0 * radius)
+    return np.stack([x, y, z], axis=1) + [300.0, 20.0, -5.0]
+
+
+@pytest.mark.parametrize("blades", [2, 3, 5])
+def test_the_rotation_of_a_pinwheel_is_found_wherever_it_stands(blades: int) -> None:
+    tilt = turn_about(np.array([1.0, 0.0, 0.0]), 0.4)
+    found = find_rotation(pinwheel(blades, 0.3) @ tilt.T, 0.5)
+    assert found.order == blades and found.misfit < 0.1
+    assert np.abs(tilt[:, 2] @ found.axis) == pytest.approx(1, abs=1e-5)
+    off = np.cross(np.subtract(tilt @ [300.0, 20.0, -5.0], found.point), found.axis)
+    assert np.linalg.norm(off) < 0.02
+    again = check_rotation(pinwheel(blades, 0.3) @ tilt.T, found.row, 0.5)
+    assert again.misfit == pytest.approx(found.misfit) and again.order == blades
+
+
+def test_a_scan_without_a_rotation_is_refused() -> None:
+    with pytest.raises(InputError, match=r"no rotation within 0.5, a tenth of a member.*; leave --symmetry out"):
+        find_rotation(vault(lean=12.0), 0.5)
+
+
+def test_turning_about_an_axis_keeps_it_and_adds_up() -> None:
+    axis = np.array([2.0, -1.0, 2.0]) / 3.0
+    part = turn_about(axis, 2 * np.pi / 7)
+    assert part @ axis == pytest.approx(axis) and np.linalg.det(part) == pytest.approx(1)
+    assert np.linalg.matrix_power(part, 7) == pytest.approx(np.eye(3))
+
+
+@compiled_only
+def test_the_grid_of_a_pinwheel_is_itself_when_turned() -> None:
+    grid = st.grid_from_points(pinwheel(), st.Settings(length=12.0, symmetry="auto", effort="quick"))
+    assert grid.certificate is not None and grid.certificate.passed and grid.settings is not None
+    assert not isinstance(grid.settings.symmetry, str)
+    (row,) = grid.settings.symmetry
+    assert row[6] == 3
+    turn = turn_about(np.array(row[3:6]), 2 * np.pi / 3)
+    centre = np.array(row[:3]) - grid.origin
+    apart, image = cKDTree(grid.nodes).query((grid.nodes - centre) @ turn.T + centre)
+    assert apart.max() < 1e-12 * 400 and len(np.unique(image)) == len(image)
+    members = {frozenset(pair) for pair in grid.edges.tolist()}
+    assert {frozenset(image[list(pair)].tolist()) for pair in members} == members
+    assert len(np.unique(np.round(grid.lengths, 9))) <= len(grid.lengths) / 3 + 1
+    assert len(grid.lines) == 0 and not grid.line_sets  # the seams are no lines
+    again = st.grid_from_points(pinwheel(), grid.settings)
+    assert np.array_equal(again.nodes, grid.nodes) and np.array_equal(again.triangles, grid.triangles)

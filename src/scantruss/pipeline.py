@@ -18,7 +18,6 @@ from .constraints.find import find_constraints
 from .errors import CertificateError, FrontError, OneSidedError, ScanTrussError
 from .front.orientation_field import orientation_fields
 from .grid.grid import Grid
-from .improve.mirrored import MIRROR_LINE, check_lines_kept, mirror_lines, mirrored_grid, sides_of
 from .runtime.progress import Progress, seer_of
 from .scan.cloud import PointCloud
 from .scan.member_length import check_length
@@ -118,7 +117,7 @@ def grid_from_cloud(
 def symmetric_grid(
     cloud: PointCloud, settings: Settings, *, progress: Progress | None = None, keep_failed: bool = False
 ) -> Grid:
-    """Return a grid that keeps mirror planes exactly: one part with rows on the planes, and its images.
+    """Return a grid that keeps mirror planes or a rotation exactly: one part with rows on its edges, and its images.
 
     A first grid tells where the planes cut the surface; a second has these lines as fixed lines and is cut off along them.
 
@@ -127,34 +126,29 @@ def symmetric_grid(
     InputError
         The scan is not symmetric within a tenth of a member.
     FrontError
-        No grid passes the checks, or the rows do not follow the planes.
+        No grid passes the checks, or the rows do not follow the edges of the part.
     """
-    from .scan.symmetry import SYMMETRY_TOLERANCE, check_mirror_planes, find_mirror_planes
+    from .improve.symmetric import EDGE_LINE, find_symmetry
 
-    points, tolerance = np.asarray(cloud.points) + cloud.origin, SYMMETRY_TOLERANCE * settings.length
-    if isinstance(settings.symmetry, str):
-        planes = find_mirror_planes(points, tolerance)
-    else:
-        planes = check_mirror_planes(points, settings.symmetry, tolerance)
+    symmetry = find_symmetry(np.asarray(cloud.points) + cloud.origin, settings)
     plain = settings.replace(symmetry="")
-    lines = mirror_lines(grid_from_cloud(cloud, plain, progress=progress), planes, settings.length)
-    names = plain.line_names or [f"line {number}" for number in range(1, len(plain.fixed_lines) + 1)]
-    lined = plain.replace(
-        fixed_lines=[*plain.fixed_lines, *(line.tolist() for line in lines)],
-        line_names=[*names, *(f"{MIRROR_LINE} {number}" for number in range(1, len(lines) + 1))],
-    )
-    half = grid_from_cloud(cloud, lined, progress=progress)
-    own = (half.settings or lined).replace(fixed_lines=plain.fixed_lines, line_names=plain.line_names)
-    samples, boundary = find_boundary(sample_surface(cloud, own), own, progress=progress)
-    kept = own.replace(symmetry=[plane.row for plane in planes])
     refused: FrontError | None = None
-    for side in sides_of(planes):
-        try:
-            made = mirrored_grid(half, side, settings.length)
-            check_lines_kept(half, made, settings.length)
-            return certified(made.replace(settings=kept), samples, boundary, own)
-        except FrontError as error:
-            refused = refused or error
+    for lines in symmetry.edges(grid_from_cloud(cloud, plain, progress=progress), settings.length):
+        names = plain.line_names or [f"line {number}" for number in range(1, len(plain.fixed_lines) + 1)]
+        lined = plain.replace(
+            fixed_lines=[*plain.fixed_lines, *(line.tolist() for line in lines)],
+            line_names=[*names, *(f"{EDGE_LINE} {number}" for number in range(1, len(lines) + 1))],
+        )
+        half = grid_from_cloud(cloud, lined, progress=progress)
+        own = (half.settings or lined).replace(fixed_lines=plain.fixed_lines, line_names=plain.line_names)
+        samples, boundary = find_boundary(sample_surface(cloud, own), own, progress=progress)
+        kept = own.replace(symmetry=symmetry.rows)
+        for part in range(symmetry.parts):
+            try:
+                made = symmetry.made(half, lines, settings.length, part)
+                return certified(made.replace(settings=kept), samples, boundary, own)
+            except FrontError as error:
+                refused = refused or error
     assert refused is not None
     if keep_failed and isinstance(refused, CertificateError):
         return refused.grid

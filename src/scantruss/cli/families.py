@@ -4,14 +4,21 @@ from __future__ import annotations
 
 from argparse import Namespace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..errors import InputError
 from .outputs import claim, outs_of
 
 if TYPE_CHECKING:
+    from ..boundary.find import Boundary
     from ..grid.grid import Grid
+    from ..layouts.families import Families
+    from ..layouts.joints_alike import JointFamilies
+    from ..settings import Settings
+    from ..surface.samples import SurfaceSamples
     from .options import Parser
+
+ALIKE = ("lengths", "joints")  # what shall be alike
 
 
 def families_parser() -> Parser:
@@ -20,26 +27,40 @@ def families_parser() -> Parser:
 
     parser = Parser(
         "families",
-        "GRID OUT [OUT ...] [--tolerance 1%%] [--count 12] [--scan SCAN] [options]",
-        "Move the nodes of a saved grid along its surface, so that its members are of few lengths.",
+        "GRID OUT [OUT ...] [--parts lengths|joints] [--tolerance 1%%] [--count 12] [--scan SCAN] [options]",
+        "Move the nodes of a saved grid along its surface, so that its members are of few lengths, or its joints alike.",
     )
     parser.add_argument("grid", metavar="GRID", help="grid saved as .json by scantruss grid")
     add_outs(parser, "results; the suffix names the format", "*")
+    parser.add_argument(
+        "--parts",
+        choices=ALIKE,
+        default=ALIKE[0],
+        help="what shall be alike: the lengths of the members, or the joints, as the directions of their members (default lengths)",
+    )
     parser.add_argument(
         "--tolerance",
         metavar="SHARE",
         type=share,
         default=0.01,
-        help="largest misfit over the mean member (default 1%%)",
+        help="largest misfit over the mean member, of joints that of unit directions, as root mean square (default 1%%)",
     )
     parser.add_argument(
-        "--count", metavar="COUNT", type=whole_number, default=12, help="lengths to aim at (default 12)"
+        "--count",
+        metavar="COUNT",
+        type=whole_number,
+        default=12,
+        help="lengths to aim at (default 12); of joints there are as few as can be",
     )
     parser.add_argument("--scan", metavar="SCAN", help="scan that the grid is checked against again: its certificate")
     parser.add_argument(
         "--report", metavar="FILE", help="families with their members, and lengths before and after, .json"
     )
-    parser.add_argument("--plot", metavar="FILE.png", help="number of lengths against the largest misfit")
+    parser.add_argument(
+        "--plot",
+        metavar="FILE.png",
+        help="number of lengths against the largest misfit, and with --scan against the distance from it",
+    )
     parser.add_argument(
         "--keep-failed", action="store_true", help="also take and write a grid that fails its certificate"
     )
@@ -59,6 +80,8 @@ def families(values: Namespace) -> None:
     report = None if values.report is None else check_place(values.report, (".json",))
     plot = None if values.plot is None else check_place(values.plot, (".png",))
     taken = {Path(name).resolve(): what for name, what in ((values.grid, "grid"), (values.scan, "scan")) if name}
+    if plot is not None and values.parts != ALIKE[0]:
+        raise InputError("--plot draws lengths; leave it out with --parts joints")
     claim_models(outs, taken, force=values.force)
     for place, what in ((report, "report"), (plot, "picture")):
         if place is not None:
@@ -67,47 +90,92 @@ def families(values: Namespace) -> None:
     from ..export.json import read_grid
     from ..export.model import model_of_grid
     from ..grid.certificate import check_passed
-    from ..layouts.families import family_report, few_lengths
+    from ..layouts.families import Families, family_report
+    from ..layouts.joints_alike import joint_report
 
     with Bars() as bars, SaveTogether("" if values.force else "result") as save:
         bars("read", 0.0)
         before = read_grid(values.grid)
         check_passed(before, values.keep_failed)
         bars("families", 0.1)
-        found = few_lengths(before, values.tolerance, values.count)
-        made = _certified(before, found.grid, values) if values.scan else found.grid
-        figures = family_report(before, found, values.tolerance)
+        found = _alike(before, values)
+        scan = _Scan.of_grid(before, values) if values.scan else None
+        made = scan.certified(found.grid, keep_failed=values.keep_failed) if scan else found.grid
+        if isinstance(found, Families):
+            figures = family_report(before, found, values.tolerance)
+            words = _words(figures)
+        else:
+            figures = joint_report(found, values.tolerance, float(before.lengths.mean()))
+            words = _words_of_joints(figures)
         wrote = write_models(model_of_grid(made), outs, save, bars)
         if report is not None:
             save.json(report, figures)
         if plot is not None:
-            save.beside(plot).write_bytes(encode_families(before, values.tolerance))
+            save.beside(plot).write_bytes(
+                encode_families(before, values.tolerance, off_scan=scan and scan.farthest_node)
+            )
     wrote += [place for place in (report, plot) if place is not None]
-    print_lines([*_words(figures, values), f"wrote {' '.join(map(str, wrote))}"])
+    print_lines([*words, *_after(values), f"wrote {' '.join(map(str, wrote))}"])
 
 
-def _certified(before: Grid, made: Grid, values: Namespace) -> Grid:
-    """Return the grid with a certificate of the scan."""
-    from ..boundary.find import find_boundary
-    from ..cells.make import judging_settings, settings_of_triangles
-    from ..check.certify import certify
-    from ..grid.certificate import check_passed
-    from ..scan.formats.reading import read_points
-    from ..surface.samples import sample_surface
+class _Scan(NamedTuple):
+    """The scan that a grid is compared with."""
 
-    if (settings := before.settings) is None:
-        raise InputError(f"{values.grid} does not say with which settings it was made; leave --scan out")
-    cloud = read_points(values.scan, settings.unit, settings.selection)
-    plain = settings_of_triangles(settings)
-    samples, boundary = find_boundary(sample_surface(cloud, plain), plain)
-    moved = made.replace(nodes=made.nodes + (made.origin - samples.origin), origin=samples.origin)
-    certificate = certify(moved, samples, boundary, judging_settings(settings))
-    moved = moved.replace(certificate=certificate)
-    check_passed(moved, values.keep_failed)
-    return moved
+    samples: SurfaceSamples
+    boundary: Boundary
+    settings: Settings
+
+    @classmethod
+    def of_grid(cls, grid: Grid, values: Namespace) -> _Scan:
+        """Read the scan with the settings of a grid."""
+        from ..boundary.find import find_boundary
+        from ..cells.make import settings_of_triangles
+        from ..scan.formats.reading import read_points
+        from ..surface.samples import sample_surface
+
+        if (settings := grid.settings) is None:
+            raise InputError(f"{values.grid} does not say with which settings it was made; leave --scan out")
+        cloud = read_points(values.scan, settings.unit, settings.selection)
+        plain = settings_of_triangles(settings)
+        return cls(*find_boundary(sample_surface(cloud, plain), plain), settings)
+
+    def at_scan(self, grid: Grid) -> Grid:
+        """Return a grid with the origin of the scan."""
+        return grid.replace(nodes=grid.nodes + (grid.origin - self.samples.origin), origin=self.samples.origin)
+
+    def certified(self, grid: Grid, *, keep_failed: bool) -> Grid:
+        """Return a grid with a certificate of the scan."""
+        from ..cells.make import judging_settings
+        from ..check.certify import certify
+        from ..grid.certificate import check_passed
+
+        moved = self.at_scan(grid)
+        certificate = certify(moved, self.samples, self.boundary, judging_settings(self.settings))
+        moved = moved.replace(certificate=certificate)
+        check_passed(moved, keep_failed)
+        return moved
+
+    def farthest_node(self, grid: Grid) -> float:
+        """Return the largest distance of a node of a grid from the scan [unit of the grid]."""
+        import numpy as np
+
+        from ..check.distances import distances_to_points
+
+        _, nodes, _ = distances_to_points(self.at_scan(grid), self.samples, self.settings.length)
+        return float(np.nanmax(nodes))
 
 
-def _words(figures: dict[str, Any], values: Namespace) -> list[str]:
+def _alike(before: Grid, values: Namespace) -> Families | JointFamilies:
+    """Return the grid with its lengths or its joints alike."""
+    from ..layouts.families import few_lengths
+    from ..layouts.joints_alike import few_joints
+
+    if values.parts == ALIKE[1]:
+        return few_joints(before, values.tolerance)
+    return few_lengths(before, values.tolerance, values.count)
+
+
+def _words(figures: dict[str, Any]) -> list[str]:
     """Return what has come out in words."""
     lines = [
         f"{what} of the mean member: {each['before']} lengths before, {each['after']} after"
@@ -119,6 +187,20 @@ def _words(figures: dict[str, Any], values: Namespace) -> list[str]:
     )
     if figures["members_within"] < 1:
         lines.append("warning: some members are in no family within the tolerance; use a larger --count or --tolerance")
-    if not values.scan:
-        lines.append("the grid has no certificate now; --scan SCAN checks it again")
     return lines
+
+
+def _words_of_joints(figures: dict[str, Any]) -> list[str]:
+    """Return what has come out of joints in words."""
+    kinds = figures["kinds"]
+    return [
+        f"{figures['kinds_before']} kinds of joints before, {len(kinds)} after, of {sum(each['nodes'] for each in kinds)} joints,"
+        f" within {100 * figures['tolerance']:g} %",
+        f"the largest misfit is {100 * figures['misfit_max']:.3g} %, nodes moved by {figures['moved_max']:.2g} members at most,"
+        f" lengths vary by {100 * figures['length_cv']:.3g} %",
+    ]
+
+
+def _after(values: Namespace) -> list[str]:
+    """Return what is to be done then."""
+    return [] if values.scan else ["the grid has no certificate now; --scan SCAN checks it again"]

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from ..errors import CertificateError, FormatError, FrontError, LengthError
 from ..export.drawing.style import VIEWS
 from ..export.style import OBJ_ELEMENTS, FileStyle
+from ..settings.values import ROTATION_NUMBERS
 from .outputs import claim, inputs_of, outs_of
 from .shared import (
     SCAN_HELP,
@@ -193,14 +194,19 @@ def grid_with_notes(
         if getattr(made, name) != getattr(settings, name) and not (smoothed and name == "ridge_angle"):
             bars.note(words)
     if settings.symmetry:
-        planes = [", ".join(f"{c:.4g}" for c in row) for row in made.symmetry if not isinstance(row, str)]
-        bars.note(
-            f"symmetric in {len(planes)} mirror plane{'s' * (len(planes) != 1)}, as point and normal: {'; '.join(planes)}"
-        )
+        bars.note(words_of_symmetry([row for row in made.symmetry if not isinstance(row, str)]))
     note_outliers(bars, cloud, made)
     note_layers(bars, cloud, made)
     note_pieces(bars, cloud, made)
     return grid
+
+
+def words_of_symmetry(rows: Sequence[Sequence[float]]) -> str:
+    """Return which symmetry a grid keeps, in words."""
+    words = "; ".join(", ".join(f"{c:.4g}" for c in row) for row in rows)
+    if len(rows[0]) == ROTATION_NUMBERS:
+        return f"the same when turned by 360/{rows[0][-1]:.0f} degrees about an axis, as point, axis and parts: {words}"
+    return f"symmetric in {len(rows)} mirror plane{'s' * (len(rows) != 1)}, as point and normal: {words}"
 
 
 def note_smoothed(bars: Bars, grid: Grid) -> None:

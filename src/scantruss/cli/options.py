@@ -16,6 +16,7 @@ from typing import Any, NoReturn
 from ..errors import InputError
 from ..selection import Selection, read_crop
 from ..settings import CURVATURE, RECORDS, Settings
+from ..settings.values import SYMMETRIES_FOUND
 from .positions import position, read_planes, read_polylines, read_positions
 
 
@@ -240,7 +241,7 @@ def _add_options(group: argparse._ArgumentGroup, specs: Iterable[Field[Any]]) ->
                 "; a text file of points X,Y,Z, an empty line or another `name` between two polylines; repeatable"
             )
         elif spec.name == "symmetry":
-            options["metavar"] = "auto|FILE"
+            options["metavar"] = "auto|rotation|FILE"
         elif spec.name == "classes":
             options |= {"action": "append", "metavar": "NUMBER,..."}
             options["help"] += "; repeatable"
@@ -298,7 +299,7 @@ def settings_of(values: argparse.Namespace) -> Settings:
         named_lines = [line for path in explicit["fixed_lines"] for line in read_polylines(path)]
         explicit["fixed_lines"] = tuple(points for _, points in named_lines)
         explicit["line_names"] = tuple(name for name, _ in named_lines)
-    if explicit.get("symmetry", "auto") != "auto":
+    if explicit.get("symmetry", "auto") not in SYMMETRIES_FOUND:
         explicit["symmetry"] = read_planes(explicit["symmetry"])
     if "boundary" in explicit:
         explicit["boundary"] = tuple(

@@ -10,6 +10,7 @@ from pathlib import Path
 from ..errors import FormatError
 from ..runtime.ours import check_ours
 from ..settings import CURVATURE
+from ..settings.values import SYMMETRIES_FOUND
 
 Taken = dict[Path, str]  # place of a file -> what is there
 VALUE = re.compile(r"[a-z-]{2,}:[-+]?\d")  # begin of the value of an option, such as snow:1kN/m2
@@ -31,7 +32,7 @@ def inputs_of(values: Namespace) -> Taken:
     named += [(given.get(name) or "", what) for name, what in single]
     named += [(name, "file of lengths") for name in _lengths(given.get("length")) if not name.startswith(CURVATURE)]
     named += [(name, "fixed line") for name in given.get("fixed_lines", ())]
-    named += [(name, "mirror planes") for name in [given.get("symmetry")] if name and name != "auto"]
+    named += [(name, "mirror planes") for name in [given.get("symmetry")] if name and name not in SYMMETRIES_FOUND]
     named += [(name, "boundary") for name in given.get("boundary", ())]
     named += [(name, "polygon") for name in given.get("crop", ()) if Path(name).is_file()]
     return {Path(name).resolve(): what for name, what in named if name}

@@ -7,6 +7,7 @@ import re
 from pathlib import Path
 
 from ..errors import FormatError
+from ..settings.values import ROTATION_NUMBERS
 
 Position = tuple[float, float, float]
 NamedPart = tuple[str, list[Position]]  # name of a part of a file, "" for none, and its positions
@@ -35,7 +36,9 @@ def read_positions(path: str | Path) -> list[Position]:
 
 
 def read_planes(path: str | Path) -> tuple[tuple[float, ...], ...]:
-    """Return the mirror planes in a text file: a point and a normal, six numbers a line, any separator, `#` before comments.
+    """Return the symmetry in a text file, any separator, `#` before comments.
+
+    Mirror planes are a point and a normal, six numbers a line; a rotation is one line of a point, an axis and the parts of a turn.
 
     Raises
     ------
@@ -47,7 +50,7 @@ def read_planes(path: str | Path) -> tuple[tuple[float, ...], ...]:
     except (OSError, UnicodeDecodeError) as error:
         words = getattr(error, "strerror", None) or "it is no text"
         raise FormatError(
-            f"cannot read mirror planes {path}: {words}; --symmetry needs auto or a file of planes"
+            f"cannot read mirror planes {path}: {words}; --symmetry needs auto, rotation or a file of planes"
         ) from None
     rows = []
     for number, line in enumerate(lines, 1):
@@ -57,7 +60,7 @@ def read_planes(path: str | Path) -> tuple[tuple[float, ...], ...]:
             row = tuple(map(float, words))
         except ValueError:
             row = ()
-        if len(row) != 6:
+        if len(row) not in (6, ROTATION_NUMBERS):
             raise FormatError(
                 f"{path}, line {number}: a mirror plane needs six numbers, x y z nx ny nz, got {line.strip()!r}"
             )

@@ -12,6 +12,7 @@ import numpy as np
 from ..errors import FrontError
 from ..grid.grid import Grid
 from ..grid.line_sets import FIXED_LINE, LineSet
+from ..scan.rotation import turn_about
 
 if TYPE_CHECKING:
     from ..scan.symmetry import MirrorPlane
@@ -40,7 +41,7 @@ class _Wedge:
         made = []
         for k in range(self.copies):
             angle = 2.0 * math.pi / self.copies * (k if k % 2 == 0 else k + 1)
-            turn = _rotation(self.axis, angle)
+            turn = turn_about(self.axis, angle)
             made.append(turn if k % 2 == 0 else turn @ mirror)
         return made
 
@@ -78,8 +79,8 @@ def mirror_lines(grid: Grid, planes: Sequence[MirrorPlane], length: float) -> li
     wedge = wedge_of(planes, grid.origin)
     found: list[np.ndarray] = []
     for (normal, offset), ray in zip(wedge.walls, wedge.rays, strict=True):
-        for line in _section(grid, normal, offset):
-            pieces = [line] if ray is None else _beyond(line, wedge.centre, ray)
+        for line in section_of(grid, normal, offset):
+            pieces = [line] if ray is None else beyond_axis(line, wedge.centre, ray)
             long = [
                 each for each in pieces if np.linalg.norm(np.diff(each, axis=0), axis=1).sum() >= LEAST_PIECE * length
             ]
@@ -120,7 +121,7 @@ def mirrored_grid(grid: Grid, planes: Sequence[MirrorPlane], length: float) -> G
     return _united(grid, nodes, kept, at_wall, on_axis, wedge)
 
 
-def check_lines_kept(before: Grid, made: Grid, length: float) -> None:
+def check_lines_kept(before: Grid, made: Grid, length: float, symmetry: str = "the mirror planes") -> None:
     """Refuse images of which the fixed lines are not those that the user gave, since these are not symmetric.
 
     Raises
@@ -140,7 +141,7 @@ def check_lines_kept(before: Grid, made: Grid, length: float) -> None:
             if np.linalg.norm(away - share[:, None] * along, axis=1).min(initial=math.inf) > ON_PLANE * length:
                 where = ", ".join(f"{c:.5g}" for c in before.scan_nodes[node])
                 raise FrontError(
-                    f"the fixed line {line.name} is not symmetric in the mirror planes, near ({where}); give its image too",
+                    f"the fixed line {line.name} is not symmetric in {symmetry}, near ({where}); give its image too",
                     made,
                 )
 
@@ -172,24 +173,24 @@ def _united(
         nodes=made,
         triangles=triangles,
         fixed=grid.fixed[source],
-        lines=_lines(grid, number_of),
-        line_sets=_line_sets(grid, number_of),
+        lines=images_of_members(grid.lines, number_of),
+        line_sets=images_of_lines(grid.line_sets, number_of),
         deviation=None if grid.deviation is None else grid.deviation[source],
         desired=None if grid.desired is None else grid.desired[source],
     )
 
 
-def _lines(grid: Grid, number_of: np.ndarray) -> np.ndarray:
-    """Return the images of members along lines, each once."""
-    lines = np.concatenate([each[grid.lines] for each in number_of])
-    return np.unique(np.sort(lines[(lines >= 0).all(axis=1)], axis=1), axis=0)
+def images_of_members(lines: np.ndarray, number_of: np.ndarray) -> np.ndarray:
+    """Return the images of members along lines (K, 2), each once; number_of: of each node in each image (M, V), -1 for none."""
+    made = np.concatenate([each[lines] for each in number_of])
+    return np.unique(np.sort(made[(made >= 0).all(axis=1)], axis=1), axis=0)
 
 
-def _line_sets(grid: Grid, number_of: np.ndarray) -> tuple[LineSet, ...]:
-    """Return the lines with their images, each line once."""
+def images_of_lines(lines: Sequence[LineSet], number_of: np.ndarray) -> tuple[LineSet, ...]:
+    """Return lines with their images, each line once; number_of: of each node in each image (M, V), -1 for none."""
     found: list[LineSet] = []
     seen: set[tuple[int, ...]] = set()
-    for line in grid.line_sets:
+    for line in lines:
         for k, numbers in enumerate(number_of):
             nodes = numbers[line.nodes]
             nodes = nodes[nodes >= 0]
@@ -231,7 +232,7 @@ def _off_axis(places: np.ndarray, wedge: _Wedge) -> np.ndarray:
     return np.asarray(away - (away @ wedge.axis)[..., None] * wedge.axis)
 
 
-def _section(grid: Grid, normal: np.ndarray, offset: float) -> list[np.ndarray]:
+def section_of(grid: Grid, normal: np.ndarray, offset: float) -> list[np.ndarray]:
     """Return the open and closed lines (K, 3) in which a plane cuts the triangles of a grid."""
     above = grid.nodes @ normal - offset
     side = above >= 0
@@ -267,7 +268,7 @@ def _section(grid: Grid, normal: np.ndarray, offset: float) -> list[np.ndarray]:
     return lines
 
 
-def _beyond(line: np.ndarray, centre: np.ndarray, ray: np.ndarray) -> list[np.ndarray]:
+def beyond_axis(line: np.ndarray, centre: np.ndarray, ray: np.ndarray) -> list[np.ndarray]:
     """Return the pieces of a line on the side of a ray from the axis, each from the axis outwards where it meets that."""
     along = (line - centre) @ ray
     pieces: list[np.ndarray] = []
@@ -284,13 +285,6 @@ def _beyond(line: np.ndarray, centre: np.ndarray, ray: np.ndarray) -> list[np.nd
     if len(now) > 1:
         pieces.append(np.array(now))
     return pieces
-
-
-def _rotation(axis: np.ndarray, angle: float) -> np.ndarray:
-    """Return the (3, 3) that turns about a unit axis."""
-    x, y, z = axis.tolist()
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.asarray(np.eye(3) + math.sin(angle) * cross + (1.0 - math.cos(angle)) * cross @ cross)
 
 
 def _refuse(grid: Grid, node: int) -> None:

@@ -4,28 +4,29 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.sparse import coo_matrix, csr_matrix, diags
+from scipy.sparse import coo_matrix, diags
 from scipy.sparse.linalg import spsolve
 
 from ..errors import InputError
 from ..grid.grid import Grid
 from ..grid.panels import triangles_of
-from .double_layer import smoothed_normals
+from .charts import Charts, shortened
+from .images import Images
 
-FAMILY_ROUNDS = 200  #: of assignment and relaxation
+FAMILY_ROUNDS = 300  #: of assignment and relaxation, each way
 INNER_SHARE = 0.9  #: of the tolerance, within which a length is taken to be that of its family
 BISECTIONS = 60  #: of the least misfit
-STIFFNESS_OF_PLACE = 0.005  #: weight of staying where one is, over that of a length
-FARTHEST_MOVE = 0.35  #: of a node along the surface, over the mean member
-HIGHEST_RISE = 0.05  #: of a node off the triangles of the grid, over the mean member; by how far its quadric may rise
-STAYING_TURN = 25.0  #: turn of the boundary from which a node stays [degree]
-HEAVIER = 1.12  #: weight of a member that lies in no family, over that of the round before
-MOST_WEIGHT = 100.0  #: of a member
-LEAST_FITTED = 5  #: nodes around one, to which a quadric is fitted
-USUAL_SHARE = 0.95  #: of the members, which few lengths shall hold
+STIFFNESS_OF_PLACE = 0.02  #: weight of staying where one is, over that of a length
+STIFFNESS_OF_MEMBERS = 0.004  #: the same over all that pulls at a node
+FARTHEST_STEP = 0.05  #: of a node in one round, over the mean member
+LEAST_WEIGHT, MOST_WEIGHT = 0.3, 1000.0  #: of a member in a family, and of one in none
+USUAL_SHARE = 0.95  #: of the members, which the large families shall hold
+LARGE_FAMILIES = 0.58  #: of the families: 7 of 12, 12 of 20
+OUT_OF_REACH = 0.1  #: of the members in no family, beyond which one way is enough
+STEPS_OF_TOLERANCE = 4  #: in a tolerance, at which lengths of small families are tried
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,10 +86,14 @@ def _middles(lengths: np.ndarray, tolerance: float, count: int, enough: int) -> 
 def few_lengths(grid: Grid, tolerance: float, count: int) -> Families:
     """Return the grid with its nodes moved along its surface so that more members are of `count` lengths.
 
-    The surface is a quadric at each node, of least squares through its neighbours and theirs; nodes of the boundary move along a parabola
-    through their neighbours. Corners, fixed nodes and nodes on lines stay. Each round gives every member the nearest of the lengths that
-    hold the most members, and moves the nodes by Gauss-Newton steps towards them; members that are in none weigh more from round to round.
-    The round with the least misfits stands.
+    The surface is a quadric at each node, of least squares through its neighbours and theirs; nodes of the boundary and of lines move along
+    a parabola through the two beside them; the symmetry of the grid is kept. Corners, fixed nodes, and ends and crossings of lines stay.
+
+    Each round assigns every member to a family and moves the nodes by a damped Gauss-Newton step towards them; members that are in none
+    weigh more from round to round. Large families, seven of twelve, are the lengths that hold the most members; they shall hold 95 %. The
+    small ones are where the rest is nearest to, on the mean of squares. The number of families falls by one each time that the
+    members have come to them; where that ends above `count`, there are `count` from the start, and other weights are tried. The best round
+    stands.
 
     Parameters
     ----------
@@ -109,33 +114,22 @@ def few_lengths(grid: Grid, tolerance: float, count: int) -> Families:
         raise InputError(f"the number of families must be 1 or more, got {count}")
     if len(grid.edges) == 0 or not grid.topology.manifold:
         raise InputError("families of members need a manifold grid with members")
-    mean = float(grid.lengths.mean())
-    frames, free, quadrics = _charts(grid)
-    place = np.zeros((len(grid.nodes), 2))
-    weight = np.ones(len(grid.edges))
-    nodes, best, least = grid.nodes, grid.nodes, math.inf
-    for _ in range(FAMILY_ROUNDS):
-        lengths = _lengths(nodes, grid.edges)
-        middles = _middles(lengths, tolerance * mean, count, len(lengths))
-        target = middles[np.abs(lengths[:, None] - middles).argmin(axis=1)]
-        off = lengths - target
-        beyond = np.maximum(np.abs(off) / (tolerance * mean) - 1, 0)
-        if (score := float((beyond > 1e-9).mean() + 1e-3 * beyond.max())) < least:
-            best, least = nodes, score
-        if score == 0:
+    charts, images, aim = Charts.of_grid(grid), Images.of_grid(grid), _Number(math.ceil(LARGE_FAMILIES * count), count)
+    start = place = np.zeros((len(grid.nodes), 2))
+    off = math.inf
+    for way in WAYS_TRIED:
+        tried, missed = _relaxed(grid, charts, images, tolerance, aim, place if way.onwards else start, way)
+        if missed < off:
+            place, off = tried, missed
+        if not 0 < off < OUT_OF_REACH:
             break
-        weight = np.where(beyond > 0, np.minimum(weight * HEAVIER, MOST_WEIGHT), np.maximum(weight / HEAVIER, 1))
-        pull = np.sign(off) * np.maximum(np.abs(off) - INNER_SHARE * tolerance * mean, 0)
-        place = _step(grid, nodes, place, frames, free, quadrics, pull, weight)
-        size = np.linalg.norm(place, axis=1, keepdims=True)
-        place *= np.minimum(1.0, FARTHEST_MOVE * mean / np.maximum(size, 1e-300))
-        nodes = _positions(grid.nodes, place, frames, quadrics, HIGHEST_RISE * mean)
-    made = grid.replace(nodes=best, deviation=None)
+    nodes = images.alike(charts.moved(place)) if place.any() else grid.nodes
+    made = grid.replace(nodes=nodes, deviation=None)
     if made.panels is not None:  # which are cut along their shortest diagonals
-        made = made.replace(triangles=triangles_of(best, made.panels), panels=made.panels)
-    middles = _middles(made.lengths, tolerance * mean, count, len(made.lengths))
+        made = made.replace(triangles=triangles_of(nodes, made.panels), panels=made.panels)
+    middles = _middles(made.lengths, tolerance * charts.mean, count, len(made.lengths))
     of = np.abs(made.lengths[:, None] - middles).argmin(axis=1)
-    return Families(made, middles, of, made.lengths - middles[of], np.linalg.norm(best - grid.nodes, axis=1))
+    return Families(made, middles, of, made.lengths - middles[of], np.linalg.norm(nodes - grid.nodes, axis=1))
 
 
 def least_misfit(lengths: np.ndarray, count: int) -> float:
@@ -181,92 +175,135 @@ def family_report(before: Grid, found: Families, tolerance: float) -> dict[str, 
     }
 
 
+class _Way(NamedTuple):
+    """How families are come to."""
+
+    heavier: float  #: weight of a member that lies in no family, over that of the round before
+    rounds: int  #: after which weights begin anew
+    one_by_one: bool  #: whether the number of families falls by one at a time
+    onwards: bool = False  #: whether it begins at the best places so far
+
+
+WAYS_TRIED = (
+    _Way(1.1, 30, True),
+    _Way(1.1, 30, False),
+    _Way(1.2, 30, True, True),
+    _Way(1.05, 60, True),
+)  #: tried in turn
+
+
+class _Number(NamedTuple):
+    """Of families."""
+
+    large: int  #: that shall hold 95 % of the members
+    all: int  #: that shall hold all
+
+
+def _relaxed(
+    grid: Grid, charts: Charts, images: Images, tolerance: float, aim: _Number, place: np.ndarray, way: _Way
+) -> tuple[np.ndarray, float]:
+    """Return the places (V, 2) on the charts of the best round, and the share of members by which it misses the aim."""
+    width = tolerance * charts.mean
+    lengths = _lengths(charts.moved(place), grid.edges)
+    best, least, since = place, math.inf, 0
+    weight = np.full(len(lengths), LEAST_WEIGHT)
+    now = _fewer(lengths, width, aim) if way.one_by_one else aim
+    for _ in range(FAMILY_ROUNDS):
+        if (missed := _missed(lengths, width, aim)) < least:
+            best, least = place, missed
+        if missed == 0:
+            break
+        if reached := way.one_by_one and _missed(lengths, width, now) == 0:
+            now = _fewer(lengths, width, aim)
+        since += 1
+        if reached or since > way.rounds:
+            weight, since = np.full(len(lengths), LEAST_WEIGHT), 0
+        off = lengths - _families_aimed_at(lengths, width, now)
+        outside = np.abs(off) > width * (1 + 1e-9)
+        weight = np.where(
+            outside,
+            np.minimum(np.maximum(weight, 1) * way.heavier, MOST_WEIGHT),
+            np.maximum(weight / way.heavier, LEAST_WEIGHT),
+        )
+        pull = np.sign(off) * np.maximum(np.abs(off) - INNER_SHARE * width, 0)
+        nodes = images.alike(charts.moved(_step(grid, charts, place, pull, weight)))
+        place = charts.place_of(nodes)
+        lengths = _lengths(nodes, grid.edges)
+    return best, least
+
+
+def _fewer(lengths: np.ndarray, width: float, aim: _Number) -> _Number:
+    """Return one family less than the members need as they are, of the large ones too, but no less than the aim."""
+    large, every = (len(lengths_needed(lengths, width, share)) for share in (USUAL_SHARE, 1.0))
+    return _Number(max(large - 1, aim.large), max(every - 1, aim.all))
+
+
+def _missed(lengths: np.ndarray, width: float, aim: _Number) -> float:
+    """Return the share of members that are in no family, and by how much the large ones hold less than 95 %."""
+    held_by_all, held_by_large = (_held(lengths, width, number) for number in (aim.all, aim.large))
+    enough = math.ceil(USUAL_SHARE * len(lengths) - 1e-9)
+    return (len(lengths) - held_by_all + max(enough - held_by_large, 0)) / len(lengths)
+
+
+def _held(lengths: np.ndarray, width: float, count: int) -> int:
+    """Return how many members the best `count` lengths hold."""
+    middles = _middles(lengths, width, count, len(lengths))
+    return int((np.abs(lengths[:, None] - middles).min(axis=1) <= width * (1 + 1e-9)).sum())
+
+
+def _families_aimed_at(lengths: np.ndarray, width: float, number: _Number) -> np.ndarray:
+    """Return the length that each member (E,) is drawn to: of the nearest large family, or for one in twenty at most of a small one."""
+    large = _middles(lengths, width, number.large, len(lengths))
+    target, off = _nearest(lengths, large)
+    beyond = np.maximum(off / width - 1, 0)
+    out = np.flatnonzero(beyond > 1e-9)
+    if len(out) == 0 or number.all <= number.large:
+        return target
+    small = _small_families(lengths[out], width, beyond[out], number.all - number.large)
+    aim, off = _nearest(lengths[out], small)
+    gain = beyond[out] - np.maximum(off / width - 1, 0)
+    few = np.argsort(-gain, kind="stable")[: int((1 - USUAL_SHARE) * len(lengths))]
+    few = few[gain[few] > 0]
+    target[out[few]] = aim[few]
+    return target
+
+
+def _small_families(lengths: np.ndarray, width: float, beyond: np.ndarray, count: int) -> np.ndarray:
+    """Return lengths, one after the other where members then are least beyond the nearest; `beyond` the large ones [tolerances]."""
+    tried = np.unique(np.round(lengths / width * STEPS_OF_TOLERANCE)) * (width / STEPS_OF_TOLERANCE)
+    costs = np.maximum(np.abs(tried[:, None] - lengths) / width - 1, 0) ** 2
+    cost, found = beyond**2, []
+    for _ in range(count):
+        best = int(np.minimum(cost, costs).sum(axis=1).argmin())
+        found.append(tried[best])
+        cost = np.minimum(cost, costs[best])
+    return np.array(found)
+
+
+def _nearest(lengths: np.ndarray, middles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the nearest of some lengths to each member, and by how far it is off."""
+    off = np.abs(lengths[:, None] - middles)
+    return middles[off.argmin(axis=1)], off.min(axis=1)
+
+
 def _lengths(nodes: np.ndarray, edges: np.ndarray) -> np.ndarray:
     """Return the lengths of the members."""
     return np.asarray(np.linalg.norm(nodes[edges[:, 1]] - nodes[edges[:, 0]], axis=1))
 
 
-def _charts(grid: Grid) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return frames (V, 3, 3) of rows u, v, n, which of u and v are free (V, 2), and heights (V, 3) of u u, u v and v v along n."""
-    count = len(grid.nodes)
-    normal = smoothed_normals(grid)
-    axis = np.eye(3)[np.abs(normal).argmin(axis=1)]
-    u = axis - (axis * normal).sum(axis=1, keepdims=True) * normal
-    u /= np.linalg.norm(u, axis=1, keepdims=True)
-    frames = np.stack([u, np.cross(normal, u), normal], axis=1)
-    free = np.ones((count, 2), bool)
-    frames, quadrics = _fitted(grid, frames)
-    for loop in grid.boundary_loops:
-        before, after = grid.nodes[np.roll(loop, 1)], grid.nodes[np.roll(loop, -1)]
-        for node, a, b in zip(loop.tolist(), before, after, strict=True):
-            here = grid.nodes[node]
-            back, on = here - a, b - here
-            s, t = float(np.linalg.norm(back)), float(np.linalg.norm(on))
-            slope = (back / s * t + on / t * s) / (s + t)  # of the parabola through the three, at the middle one
-            bend = (on / t - back / s) / (s + t)
-            frames[node, 0] = slope / np.linalg.norm(slope)
-            bend = bend - (bend @ frames[node, 0]) * frames[node, 0]
-            size = float(np.linalg.norm(bend))
-            frames[node, 2] = bend / size if size > 1e-12 / (s + t) else frames[node, 2]
-            quadrics[node] = size, 0.0, 0.0
-            turn = math.degrees(math.acos(min(1.0, max(-1.0, float(back @ on) / (s * t)))))
-            free[node] = turn < STAYING_TURN, False
-    free[grid.fixed] = False
-    free[grid.lines.ravel()] = False
-    return frames, free, quadrics
-
-
-def _fitted(grid: Grid, frames: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the frames (V, 3, 3) turned to the normals of quadrics fitted to the neighbours and theirs, and the quadrics (V, 3)."""
-    count = len(grid.nodes)
-    ends = np.concatenate([grid.edges, grid.edges[:, ::-1]])
-    near = csr_matrix((np.ones(len(ends)), tuple(ends.T)), (count, count))
-    near = near + near @ near
-    near.setdiag(0)
-    near.eliminate_zeros()
-    near.sort_indices()
-    node, place = np.repeat(np.arange(count), np.diff(near.indptr)), np.arange(near.nnz)
-    local = np.einsum("kij,kj->ki", frames[node], grid.nodes[near.indices] - grid.nodes[node])
-    around = np.zeros((count, int(np.diff(near.indptr).max(initial=1)), 3))  # rows of nil weigh nothing in the fit
-    around[node, place - near.indptr[node]] = local
-    x, y, z = around.transpose(2, 0, 1)
-    table = np.stack([x, y, x * x, x * y, y * y], axis=2)
-    fitted = (np.linalg.pinv(table) @ z[..., None])[..., 0]
-    fitted[np.diff(near.indptr) < LEAST_FITTED] = 0.0
-    u, v, normal = (frames[:, k] for k in range(3))
-    normal = normal - fitted[:, [0]] * u - fitted[:, [1]] * v
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    u = u - (u * normal).sum(axis=1, keepdims=True) * normal
-    u /= np.linalg.norm(u, axis=1, keepdims=True)
-    return np.stack([u, np.cross(normal, u), normal], axis=1), fitted[:, 2:]
-
-
-def _positions(
-    nodes: np.ndarray, place: np.ndarray, frames: np.ndarray, quadrics: np.ndarray, most: float
-) -> np.ndarray:
-    """Return where nodes are that have moved by (V, 2) along their charts."""
-    u, v = place.T
-    height = np.clip(quadrics[:, 0] * u * u + quadrics[:, 1] * u * v + quadrics[:, 2] * v * v, -most, most)
-    return np.asarray(nodes + u[:, None] * frames[:, 0] + v[:, None] * frames[:, 1] + height[:, None] * frames[:, 2])
-
-
-def _step(
-    grid: Grid, nodes: np.ndarray, place: np.ndarray, frames: np.ndarray, free: np.ndarray, quadrics: np.ndarray,
-    pull: np.ndarray, weight: np.ndarray,
-) -> np.ndarray:  # fmt: skip
-    """Return the charts' coordinates after a Gauss-Newton step that takes `pull` off the lengths."""
-    u, v = place.T
-    rise = np.stack([2 * quadrics[:, 0] * u + quadrics[:, 1] * v, quadrics[:, 1] * u + 2 * quadrics[:, 2] * v], axis=1)
-    moves = (frames[:, :2] + rise[:, :, None] * frames[:, 2:]) * free[:, :, None]  # (V, 2, 3)
+def _step(grid: Grid, charts: Charts, place: np.ndarray, pull: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Return the charts' coordinates after a damped Gauss-Newton step that takes `pull` off the lengths."""
+    ways, nodes = charts.ways(place), charts.moved(place)
     a, b = grid.edges.T
     along = nodes[b] - nodes[a]
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     rows = np.repeat(np.arange(len(along)), 4)
     columns = np.stack([2 * a, 2 * a + 1, 2 * b, 2 * b + 1], axis=1).ravel()
-    at_a, at_b = (np.einsum("ekc,ec->ek", moves[end], along) for end in (a, b))
-    table = coo_matrix(
-        (np.concatenate([-at_a, at_b], axis=1).ravel(), (rows, columns)), (len(along), place.size)
-    ).tocsr()
-    stiff = table.T @ diags(weight) @ table + diags(np.where(free.ravel(), STIFFNESS_OF_PLACE, 1.0))
-    found = spsolve(stiff.tocsc(), -(table.T @ (weight * pull)))
-    return np.asarray(place + found.reshape(place.shape) * free)
+    at_a, at_b = (np.einsum("ekc,ec->ek", ways[end], along) for end in (a, b))
+    values = np.concatenate([-at_a, at_b], axis=1).ravel()
+    table = coo_matrix((values, (rows, columns)), (len(along), place.size)).tocsr()
+    stiff = table.T @ diags(weight) @ table
+    damping = STIFFNESS_OF_PLACE + STIFFNESS_OF_MEMBERS * stiff.diagonal()
+    stiff = stiff + diags(np.where(charts.free.ravel(), damping, 1.0))
+    found = spsolve(stiff.tocsc(), -(table.T @ (weight * pull))).reshape(place.shape)
+    return charts.within(place + shortened(found * charts.free, FARTHEST_STEP * charts.mean))

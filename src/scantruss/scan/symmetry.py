@@ -49,7 +49,7 @@ class MirrorPlane:
 
 
 @dataclass(frozen=True, eq=False)
-class _Places:
+class PlacesOfScan:
     """Places that stand for a scan, evenly, with normals."""
 
     at: np.ndarray  #: (Q, 3) relative to their middle
@@ -80,7 +80,7 @@ def find_mirror_planes(points: np.ndarray, tolerance: float) -> tuple[MirrorPlan
     InputError
         The scan has no mirror plane within the tolerance.
     """
-    places = _places(points)
+    places = places_of(points)
     planes = _candidates(places)
     found = sorted((_refined(places, normal, offset) for normal, offset in planes), key=lambda each: each[2])
     good: list[tuple[np.ndarray, float, float]] = []
@@ -100,18 +100,18 @@ def check_mirror_planes(
     points: np.ndarray, rows: Sequence[Sequence[float]], tolerance: float
 ) -> tuple[MirrorPlane, ...]:
     """Return planes that the user gives, if the scan is symmetric in each of them; see `find_mirror_planes`."""
-    places = _places(points)
+    places = places_of(points)
     planes = []
     for number, row in enumerate(rows, 1):
         point, normal = np.array(row[:3], float), np.array(row[3:], float)
-        normal = _oriented(normal / np.linalg.norm(normal))
-        (misfit,) = _misfits_of(places, [MirrorPlane(_three(point), _three(normal), 0.0)])
+        normal = oriented(normal / np.linalg.norm(normal))
+        (misfit,) = _misfits_of(places, [MirrorPlane(three_of(point), three_of(normal), 0.0)])
         if misfit > tolerance:
             raise InputError(
                 f"the scan is not symmetric in mirror plane {number}: 95 % of it lie within {misfit:.4g} of its image, and"
                 f" {tolerance:.4g}, a tenth of a member, is needed"
             )
-        planes.append(MirrorPlane(_three(point), _three(normal), misfit))
+        planes.append(MirrorPlane(three_of(point), three_of(normal), misfit))
     normals = np.array([plane.normal for plane in planes])
     for k in range(1, len(planes)):
         if np.abs(normals[:k] @ normals[k]).max() > math.cos(math.radians(PLANES_APART)):
@@ -132,8 +132,8 @@ def nearest_mirror_plane(points: np.ndarray, row: Sequence[float], tolerance: fl
     tolerance : float
         Within which 95 % of the scan must lie from its mirror image [scan unit].
     """
-    places = _places(points)
-    normal = _oriented(np.array(row[3:], float) / np.linalg.norm(row[3:]))
+    places = places_of(points)
+    normal = oriented(np.array(row[3:], float) / np.linalg.norm(row[3:]))
     drawn = float((np.array(row[:3], float) - places.origin) @ normal)
     for offset in (drawn, 0.0):  # mirror planes pass through the middle, where the points lie evenly
         turned, at, misfit = _refined(places, normal, offset)
@@ -142,7 +142,7 @@ def nearest_mirror_plane(points: np.ndarray, row: Sequence[float], tolerance: fl
     return None
 
 
-def _places(points: np.ndarray) -> _Places:
+def places_of(points: np.ndarray) -> PlacesOfScan:
     """Return the means of the points in even cells, with normals from their neighbours."""
     low, size = points.min(axis=0), float(np.ptp(points, axis=0).max())
     cell = size / CELLS_ACROSS
@@ -160,10 +160,10 @@ def _places(points: np.ndarray) -> _Places:
     _, near = tree.query(at, k=9)
     around = at[near] - at[near].mean(axis=1, keepdims=True)
     normals = np.linalg.eigh(np.einsum("qki,qkj->qij", around, around))[1][:, :, 0]
-    return _Places(at, normals, tree, cell, low + middle)
+    return PlacesOfScan(at, normals, tree, cell, low + middle)
 
 
-def _candidates(places: _Places) -> list[tuple[np.ndarray, float]]:
+def _candidates(places: PlacesOfScan) -> list[tuple[np.ndarray, float]]:
     """Return planes through the middle that leave the scan nearest to itself: among those square to or along a principal axis."""
     _, axes = np.linalg.eigh(places.at.T @ places.at)
     turns = np.radians(np.arange(0.0, 180.0, TURN_STEP))
@@ -182,7 +182,7 @@ def _candidates(places: _Places) -> list[tuple[np.ndarray, float]]:
     return [(normals[k], 0.0) for k in chosen[:PLANES_REFINED]]
 
 
-def _refined(places: _Places, normal: np.ndarray, offset: float) -> tuple[np.ndarray, float, float]:
+def _refined(places: PlacesOfScan, normal: np.ndarray, offset: float) -> tuple[np.ndarray, float, float]:
     """Return a plane moved to where the scan is nearest to its image, and its misfit: iterated closest points to planes."""
     everything = np.arange(len(places.at))
     for _ in range(PLANE_STEPS):
@@ -202,12 +202,12 @@ def _refined(places: _Places, normal: np.ndarray, offset: float) -> tuple[np.nda
         offset += float(step[2])
         normal = turned / np.linalg.norm(turned)
     off, _ = places.misfits(normal, offset, everything)
-    sign = 1.0 if np.array_equal(_oriented(normal), normal) else -1.0
+    sign = 1.0 if np.array_equal(oriented(normal), normal) else -1.0
     return sign * normal, sign * offset, float(np.quantile(off, IMAGE_QUANTILE))
 
 
 def _through_one_axis(
-    places: _Places, good: list[tuple[np.ndarray, float, float]], tolerance: float
+    places: PlacesOfScan, good: list[tuple[np.ndarray, float, float]], tolerance: float
 ) -> tuple[MirrorPlane, ...]:
     """Return the largest set of planes through one axis at equal angles, the first as it is the best; else the best alone."""
     best = good[0]
@@ -235,7 +235,7 @@ def _through_one_axis(
     return (_plane(places, *best),)
 
 
-def _misfits_of(places: _Places, planes: Sequence[MirrorPlane]) -> list[float]:
+def _misfits_of(places: PlacesOfScan, planes: Sequence[MirrorPlane]) -> list[float]:
     """Return the misfit of each of some planes."""
     found = []
     for plane in planes:
@@ -247,10 +247,12 @@ def _misfits_of(places: _Places, planes: Sequence[MirrorPlane]) -> list[float]:
     return found
 
 
-def _exact(places: _Places, planes: list[tuple[np.ndarray, float, float]], axis: np.ndarray) -> tuple[MirrorPlane, ...]:
+def _exact(
+    places: PlacesOfScan, planes: list[tuple[np.ndarray, float, float]], axis: np.ndarray
+) -> tuple[MirrorPlane, ...]:
     """Return planes through one axis at exactly equal angles."""
     normals, offsets = np.array([each[0] for each in planes]), np.array([each[1] for each in planes])
-    axis = _oriented(axis)
+    axis = oriented(axis)
     centre = np.linalg.lstsq(np.concatenate([normals, axis[None]]), np.append(offsets, 0.0), rcond=None)[0]
     first = normals[0] - (normals[0] @ axis) * axis
     first /= np.linalg.norm(first)
@@ -276,11 +278,11 @@ def _axis_of(normals: np.ndarray) -> np.ndarray | None:
 
 
 def _plane(
-    places: _Places, normal: np.ndarray, offset: float, misfit: float, centre: np.ndarray | None = None
+    places: PlacesOfScan, normal: np.ndarray, offset: float, misfit: float, centre: np.ndarray | None = None
 ) -> MirrorPlane:
     """Return the record of a plane, through `centre` where one is given."""
     point = offset * normal if centre is None else centre
-    return MirrorPlane(_three(places.origin + point), _three(_oriented(normal)), misfit)
+    return MirrorPlane(three_of(places.origin + point), three_of(oriented(normal)), misfit)
 
 
 def _turned(vector: np.ndarray, axis: np.ndarray, angle: float) -> np.ndarray:
@@ -288,11 +290,12 @@ def _turned(vector: np.ndarray, axis: np.ndarray, angle: float) -> np.ndarray:
     return np.asarray(math.cos(angle) * vector + math.sin(angle) * np.cross(axis, vector))
 
 
-def _oriented(normal: np.ndarray) -> np.ndarray:
+def oriented(normal: np.ndarray) -> np.ndarray:
     """Return a normal of which the largest component is positive."""
     return normal if normal[np.abs(normal).argmax()] > 0 else -normal
 
 
-def _three(values: np.ndarray) -> tuple[float, float, float]:
+def three_of(values: np.ndarray) -> tuple[float, float, float]:
+    """Return three numbers as plain values."""
     x, y, z = values.tolist()
     return x, y, z

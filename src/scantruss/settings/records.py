@@ -262,8 +262,9 @@ class ConstraintSettings(_Checked):
     )
     symmetry: str | Sequence[Sequence[float]] = _setting(
         "",
-        "mirror planes that the grid keeps exactly: auto finds them in the scan, or rows of a point and a normal, x y z nx ny nz;"
-        " several meet in one line at equal angles",
+        "mirror planes or the rotation that the grid keeps exactly: auto finds planes in the scan, else a rotation; rotation finds that"
+        " only; or rows of a point and a normal, x y z nx ny nz, several in one line at equal angles; or one row of a point, an axis"
+        " and the parts of a turn, x y z ax ay az n",
         unit="scan unit",
     )
     ridge_angle: float = _setting(

@@ -8,6 +8,9 @@ from typing import Any
 
 from ..errors import InputError
 
+SYMMETRIES_FOUND = ("auto", "rotation")  # words for what is found in the scan
+ROTATION_NUMBERS = 7  # of a row that is a rotation: point, axis and parts of a turn; a mirror plane has six
+MOST_PARTS = 12  # of a turn
 CURVATURE = "curvature:"  # start of a length field that follows the curvature
 
 
@@ -86,10 +89,13 @@ def _coordinates(given: Any, refusal: str, needs: str) -> tuple[tuple[float, ...
 
 
 def check_symmetry(given: Any) -> str | tuple[tuple[float, ...], ...]:
-    """Return mirror planes as the settings hold them: "" for none, "auto", or rows of a point and a normal, or refuse them."""
-    if given is None or (isinstance(given, str) and given in ("", "auto")):
+    """Return a symmetry as the settings hold it, or refuse it.
+
+    "" for none, "auto", "rotation", rows of a point and a normal for mirror planes, or one row of a point, an axis and the parts of a turn.
+    """
+    if given is None or (isinstance(given, str) and given in ("", *SYMMETRIES_FOUND)):
         return given or ""
-    refusal = f"symmetry must be auto or rows of six numbers, a point and a normal, got {given!r}"
+    refusal = f"symmetry must be auto, rotation, or rows of six numbers, a point and a normal, got {given!r}"
     if isinstance(given, str):
         raise InputError(refusal)
     try:
@@ -97,7 +103,14 @@ def check_symmetry(given: Any) -> str | tuple[tuple[float, ...], ...]:
     except (TypeError, ValueError):
         raise InputError(refusal) from None
     for row in rows:
-        if len(row) != 6 or not all(map(math.isfinite, row)) or not any(row[3:]):
+        finite = all(map(math.isfinite, row)) and any(row[3:6])
+        if len(row) == ROTATION_NUMBERS and (
+            len(rows) > 1 or not finite or row[6] != round(row[6]) or not 2 <= row[6] <= MOST_PARTS
+        ):
+            raise InputError(
+                f"a rotation stands alone and needs a point, an axis and the parts of a turn, 2 to {MOST_PARTS}, got {row}"
+            )
+        if len(row) not in (6, ROTATION_NUMBERS) or not finite:
             raise InputError(f"a mirror plane needs a point and a normal, six finite numbers, got {row}")
     return rows or ""
 

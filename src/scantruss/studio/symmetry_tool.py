@@ -1,4 +1,4 @@
-"""Symmetry: mirror planes that the grid keeps exactly, found in the scan, drawn, dragged or typed."""
+"""Symmetry: mirror planes or the rotation that the grid keeps exactly, found in the scan, drawn, dragged or typed."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..scan.symmetry import SYMMETRY_TOLERANCE, nearest_mirror_plane
+from ..settings.values import ROTATION_NUMBERS, SYMMETRIES_FOUND
 from .dragging import DraggedBalls
 from .drawn_lines import ScannedPoints, numbers_of
 from .frame import DRAWN_EXTENT, SceneFrame
@@ -25,7 +26,7 @@ PLANE_RADIUS = 0.12  #: of the balls by which a plane is dragged [scene]
 LEANING = 0.1  #: greatest z of the normal of a plane that is dragged
 ABOVE = 1e-6  #: share of their distance that two places are apart in plan where they lie above each other
 PLANE_REACH = 0.6  #: of a plane that is drawn, from its middle [extent of the scan]
-SYMMETRIES = ("none", "auto", "typed")
+SYMMETRIES = ("none", *SYMMETRIES_FOUND, "typed")
 
 
 class SymmetryTool:
@@ -34,10 +35,14 @@ class SymmetryTool:
     def __init__(self, view: StudioView, gui: Any) -> None:
         self.view = view
         self.way = gui.add_dropdown(
-            "planes", SYMMETRIES, hint="auto finds them in the scan; typed takes the plane below"
+            "planes",
+            SYMMETRIES,
+            hint="auto finds planes in the scan, else a rotation; rotation finds that only; typed takes what is below",
         )
         self.words = gui.add_text(
-            "plane", "", hint="x, y, z, nx, ny, nz: a point and a normal, in the frame of the scan"
+            "plane",
+            "",
+            hint="x, y, z, nx, ny, nz: a point and a normal, in the frame of the scan; or a point, an axis and the parts of a turn",
         )
         draw = gui.add_button(
             "Draw a plane",
@@ -50,16 +55,17 @@ class SymmetryTool:
         draw.on_click(view.step(self._start))
         view.modes[PLANE_MODE] = self._click
         self.way.on_update(view.step(self._set))
-        self.words.on_update(view.typed(lambda: self._set() if self.way.value == SYMMETRIES[2] else None))
+        self.words.on_update(view.typed(lambda: self._set() if self.way.value == SYMMETRIES[-1] else None))
 
     def _set(self) -> None:
         way, session = self.way.value, self.view.session
         plane: Any = "" if way == SYMMETRIES[0] else way
-        if way == SYMMETRIES[2]:
+        if way == SYMMETRIES[-1]:
             if not self.words.value.strip():
                 self.view.say("type a plane: x, y, z, nx, ny, nz")
                 return
-            plane = (numbers_of(self.words.value, 6, "a mirror plane needs a point and a normal, six numbers"),)
+            count = ROTATION_NUMBERS if len(self.words.value.split(",")) == ROTATION_NUMBERS else 6
+            plane = (numbers_of(self.words.value, count, "a mirror plane needs a point and a normal, six numbers"),)
         if plane != session.settings.symmetry:
             session.set("symmetry", symmetry=plane)
 
@@ -107,16 +113,17 @@ class SymmetryTool:
         asked = state.settings.symmetry
         same = before is not None and before.settings.symmetry == asked
         if not same:
-            self.way.value = asked if asked == "auto" else SYMMETRIES[2 if asked else 0]
+            self.way.value = asked if asked in SYMMETRIES_FOUND else SYMMETRIES[-1 if asked else 0]
             if asked and not isinstance(asked, str):
                 self.words.value = ", ".join(f"{number:.7g}" for number in asked[0])
         if same and before is not None and before.grid is state.grid and before.cloud is state.cloud:
             return
         made = state.grid.settings.symmetry if state.grid is not None and state.grid.settings is not None else ()
-        planes = made if isinstance(asked, str) else asked
+        rows = made if isinstance(asked, str) else asked
         self.view.scene.remove("/mirror ends")
-        if state.cloud is None or isinstance(planes, str):  # auto, of a grid that has not looked for them
-            planes = ()
+        if state.cloud is None or isinstance(rows, str):  # of a grid that has not looked for them
+            rows = ()
+        planes = [row for row in rows if len(row) != ROTATION_NUMBERS]
         if state.cloud is not None:
             self._draw(planes, SceneFrame.of(state.cloud))
         if state.cloud is not None and len(planes) == 1 and abs(planes[0][5]) < LEANING * math.hypot(*planes[0][3:]):

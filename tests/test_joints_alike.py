@@ -1,0 +1,140 @@
+"""Few joints: misfits against a slow twin, fewer kinds, symmetry and surface kept, and the command."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from small_grids import dome, fan, make_grid, uneven
+
+import scantruss as st
+from scantruss.cli.main import main
+from scantruss.errors import InputError
+from scantruss.layouts import joints_alike
+from scantruss.layouts.images import Images
+from scantruss.scan.rotation import turn_about
+
+
+def best_misfit(one: np.ndarray, other: np.ndarray, turns: int = 7200) -> float:
+    """The least root mean square between unit vectors in frames with z along the normals, trying many turns and all shifts."""
+    angle = np.linspace(0, 2 * np.pi, turns, endpoint=False)
+    c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
+    best = np.inf
+    for k in range(len(one)):
+        x, y, z = np.roll(one, -k, axis=0).T
+        turned = np.stack([c * x - s * y, s * x + c * y, np.broadcast_to(z, (turns, len(z)))], axis=2)
+        best = min(best, float(np.sqrt(((turned - other) ** 2).sum(axis=2).mean(axis=1)).min()))
+    return best
+
+
+@pytest.mark.kernels
+def test_misfits_are_those_of_the_best_turn() -> None:
+    grid = uneven(5)
+    stars = joints_alike._stars_of(grid)
+    directions, sizes = stars.directions(grid.nodes)
+    own = stars.own(directions)
+    inner = np.flatnonzero((stars.is_open == 0) & (stars.valence == 6))[:4]
+    misfit, shift = stars.misfits(directions, inner)
+    assert np.allclose(misfit[inner, np.arange(len(inner))], 0, atol=1e-7) and (misfit[stars.is_open == 1] == 2).all()
+    for one in inner.tolist():
+        for column, other in enumerate(inner.tolist()):
+            assert misfit[one, column] == pytest.approx(best_misfit(own[one, :6], own[other, :6]), abs=1e-5)
+            assert 0 <= shift[one, column] < 6
+    ends = {frozenset((v, u)) for v in range(len(grid.nodes)) for u in stars.ring[v].tolist() if u >= 0}
+    assert ends == {frozenset(edge) for edge in grid.edges.tolist()}
+    assert sizes[stars.ring >= 0] == pytest.approx(
+        np.linalg.norm(np.diff(grid.nodes[grid.edges], axis=1), axis=2).mean(), rel=0.3
+    )
+
+
+def test_rings_run_anticlockwise_from_the_boundary() -> None:
+    stars = joints_alike._stars_of(fan())
+    assert stars.is_open.tolist() == [0, 1, 1, 1, 1, 1, 1]
+    for k in range(6):
+        assert stars.ring[1 + k, :3].tolist() == [1 + (k + 1) % 6, 0, 1 + (k - 1) % 6]
+    normals = stars.normals(stars.directions(fan().nodes)[0])
+    assert normals == pytest.approx(np.tile([0.0, 0.0, 1.0], (7, 1)))
+
+
+def test_aims_of_equal_joints_are_where_their_members_are() -> None:
+    grid = dome(6)
+    flat = grid.replace(nodes=grid.nodes * [1, 1, 0])
+    found = st.few_joints(flat)
+    stars = joints_alike._stars_of(flat)
+    directions, _ = stars.directions(flat.nodes)
+    misfit, shift = stars.misfits(directions, found.representative)
+    near = misfit.argmin(axis=1)
+    every = np.arange(len(near))
+    aims = joints_alike._aims(
+        stars, directions, near, shift[every, near], np.ones(len(near), bool), len(found.representative)
+    )
+    assert aims == pytest.approx(directions, abs=1e-7)
+    assert found.before == len(found.representative) and np.array_equal(found.grid.nodes, flat.nodes)
+
+
+def test_there_are_fewer_kinds_of_joints_and_nodes_stay_on_the_surface() -> None:
+    grid = uneven(7)
+    grid = grid.replace(fixed=np.arange(len(grid.nodes)) == 24)
+    mean = float(grid.lengths.mean())
+    found = st.few_joints(grid, 0.02)
+    assert len(found.representative) < 0.8 * found.before and found.counts.sum() == len(grid.nodes)
+    assert found.misfit.max() <= 0.02 and found.moved.max() <= 0.41 * mean
+    nodes = found.grid.nodes
+    assert np.array_equal(nodes[24], grid.nodes[24]) and np.array_equal(found.grid.triangles, grid.triangles)
+    wide = dome(7, 4.0).nodes[:, 0].max()
+    surface = 0.3 * wide - 0.3 * (nodes[:, 0] ** 2 + nodes[:, 1] ** 2) / wide
+    inner = np.setdiff1d(np.arange(len(nodes)), np.concatenate(grid.boundary_loops))
+    assert np.abs(nodes[:, 2] - surface)[inner].max() < 0.05 * mean
+    again = st.few_joints(grid, 0.02)
+    assert np.array_equal(again.grid.nodes, nodes)
+
+
+def three_parts() -> st.Grid:
+    """A flat grid of three parts about the origin, each uneven in the same way, with a rotation in its settings."""
+    ring = np.array([[1.0, 0.0, 0.0], [0.55, 0.8, 0.0]])
+    outer = np.array([[2.1, 0.1, 0.0], [1.6, 1.1, 0.0], [0.9, 1.7, 0.0], [0.0, 2.0, 0.0]])
+    turn = turn_about(np.array([0.0, 0.0, 1.0]), 2 * np.pi / 3)
+    nodes = [np.zeros((1, 3))]
+    for k in range(3):
+        nodes.append(np.concatenate([ring, outer]) @ np.linalg.matrix_power(turn, k).T)
+    triangles = []
+    for k in range(3):
+        a, b, p, q, r, s = range(1 + 6 * k, 7 + 6 * k)
+        c, t = 1 + 6 * ((k + 1) % 3), 3 + 6 * ((k + 1) % 3)
+        triangles += [(0, a, b), (0, b, c), (a, p, q), (a, q, b), (b, q, r), (b, r, c), (c, r, s), (c, s, t)]
+    settings = st.Settings(length=1.0, symmetry=[(0, 0, 0, 0, 0, 1, 3)])
+    return make_grid(np.concatenate(nodes), triangles, settings=settings)
+
+
+def test_what_is_symmetric_stays_so() -> None:
+    grid = three_parts()
+    images = Images.of_grid(grid)
+    assert len(images.matrices) == 3
+    shaken = grid.nodes + 0.1 * np.random.default_rng(3).standard_normal(grid.nodes.shape)
+    alike = images.alike(shaken)
+    for matrix, of in zip(images.matrices, images.of, strict=True):
+        assert alike[of] == pytest.approx(alike @ matrix.T, abs=1e-14)
+    assert images.alike(alike) == pytest.approx(alike, abs=1e-14)
+    for made in (st.few_joints(grid, 0.05).grid, st.few_lengths(grid, 0.02, 4).grid):
+        assert len(Images.of_grid(made).matrices) == 3
+    assert len(Images.of_grid(grid.replace(nodes=shaken)).matrices) == 1  # the settings say so, the nodes do not
+
+
+@pytest.mark.parametrize("tolerance", [0.0, 0.5])
+def test_a_tolerance_that_cannot_be_used_is_refused(tolerance: float) -> None:
+    with pytest.raises(InputError, match="the tolerance of joints is"):
+        st.few_joints(dome(4), tolerance)
+
+
+def test_the_command_makes_few_joints(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    st.write(uneven(6), "grid.json")
+    words = "families grid.json out.json --parts joints --tolerance 2% --report report.json"
+    assert main(words.split()) == 0
+    report = json.loads(Path("report.json").read_text())
+    assert sum(each["nodes"] for each in report["kinds"]) == 36 and len(report["kinds"]) < report["kinds_before"]
+    assert "kinds of joints before" in capsys.readouterr().out
+    assert main([*words.split(), "--force", "--plot", "plot.png"]) == 2
+    assert "leave it out with --parts joints" in capsys.readouterr().err
