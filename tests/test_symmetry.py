@@ -74,6 +74,22 @@ def test_a_scan_without_a_mirror_plane_is_refused() -> None:
 
 
 @compiled_only
+def test_a_hole_beside_the_plane_is_refused_and_not_mirrored() -> None:
+    """So few points have no counterpart that the planes are found all the same."""
+    points = vault()
+    away = np.hypot(points[:, 0] - 505.0, points[:, 1] + 200.0)
+    settings = st.Settings(
+        length=LENGTH, symmetry=((500.0, -200.0, 0.0, 1.0, 0.0, 0.0),), effort="quick", fill_holes=0.0
+    )
+    with pytest.raises(FrontError, match="the boundary of the scan has no counterpart near") as refused:
+        st.grid_from_points(points[away > 16.0], settings)
+    assert refused.value.where is not None
+    assert np.hypot(refused.value.where[0] - 505.0, refused.value.where[1] + 200.0) == pytest.approx(16.0, abs=3.0)
+    closed = settings.replace(fill_at=((521.0, -200.0, 36.0),))
+    assert st.grid_from_points(points[away > 16.0], closed).topology.boundary_loops == 1
+
+
+@compiled_only
 @pytest.mark.parametrize("lean", [0.0, 12.0])
 def test_the_grid_is_its_own_image_to_rounding(lean: float) -> None:
     settings = st.Settings(length=LENGTH, symmetry="auto", effort="quick")

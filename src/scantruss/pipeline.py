@@ -128,7 +128,7 @@ def symmetric_grid(
     FrontError
         No grid passes the checks, or the rows do not follow the edges of the part.
     """
-    from .improve.symmetric import EDGE_LINE, find_symmetry
+    from .improve.symmetric import EDGE_LINE, check_boundary_kept, find_symmetry
 
     symmetry = find_symmetry(np.asarray(cloud.points) + cloud.origin, settings)
     plain = settings.replace(symmetry="")
@@ -146,6 +146,7 @@ def symmetric_grid(
         for part in range(symmetry.parts):
             try:
                 made = symmetry.made(half, lines, settings.length, part)
+                check_boundary_kept(made, boundary, settings.length)
                 return certified(made.replace(settings=kept), samples, boundary, own)
             except FrontError as error:
                 refused = refused or error

@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import InputError
+from ..constraints.network import curves_of
+from ..errors import FrontError, InputError
+from ..kernels.boundary.curves import nearest_on_curves
 from ..scan.rotation import Rotation, check_rotation, find_rotation
 from ..scan.symmetry import SYMMETRY_TOLERANCE, MirrorPlane, check_mirror_planes, find_mirror_planes
 from ..settings.values import ROTATION_NUMBERS
@@ -18,10 +20,35 @@ from .mirrored import check_lines_kept, mirror_lines, mirrored_grid, sides_of
 from .rotated import rotated_grid, seams_of
 
 if TYPE_CHECKING:
+    from ..boundary.find import Boundary
     from ..grid.grid import Grid
     from ..settings import Settings
 
-__all__ = ["EDGE_LINE", "Symmetry", "find_symmetry"]
+__all__ = ["EDGE_LINE", "Symmetry", "check_boundary_kept", "find_symmetry"]
+
+ON_BOUNDARY = 0.4  # farthest that the boundary of the scan may lie from that of the images [member lengths]
+
+
+def check_boundary_kept(made: Grid, boundary: Boundary, length: float) -> None:
+    """Refuse images whose boundary is not that of the scan, since a hole or an edge of it has no counterpart.
+
+    Raises
+    ------
+    FrontError
+        Names the farthest place.
+    """
+    loops = [loop for loop in boundary.loops if loop.cut != "close"]
+    curves = curves_of([made.nodes[np.array(own)] for own in made.boundary_loops], [True] * len(made.boundary_loops))
+    places = np.concatenate([np.zeros((0, 3)), *(loop.points for loop in loops)])
+    away = np.array([nearest_on_curves(curves, *place)[2] for place in places.tolist()])
+    if len(away) and away.max() > ON_BOUNDARY * length:
+        x, y, z = (places[away.argmax()] + made.origin).tolist()
+        raise FrontError(
+            f"the boundary of the scan has no counterpart near ({x:.5g}, {y:.5g}, {z:.5g}), as where a hole lies on one side only;"
+            " close the hole with --fill-at, or leave --symmetry out",
+            made,
+            (x, y, z),
+        )
 
 
 class Symmetry(ABC):
