@@ -14,6 +14,7 @@ from typed import known
 
 from scantruss import Grid, PointCloud, Settings, candidates, grid_from_points
 from scantruss.check.certify import checked
+from scantruss.constraints.find import wanted_ridges
 from scantruss.constraints.fold_tracing import Tracer, is_even, parts_of
 from scantruss.constraints.ridge_ends import Ridge, join_ends
 from scantruss.constraints.ridges import find_ridges
@@ -321,3 +322,16 @@ def test_ridges_are_found_once_for_the_same_samples_and_settings() -> None:
     first.clear()  # what a caller does with the list is its own business
     assert len(find_ridges(samples, settings)) == 12
     assert find_ridges(samples, settings.replace(ridge_angle=120.0)) == []
+
+
+def test_only_ridges_of_the_pieces_that_get_a_grid_are_followed() -> None:
+    both = np.concatenate([box(), 0.9 * box() + [100.0, 0.0, 0.0]])
+    for piece, middle in (("1", 0.0), ("2", 100.0)):
+        settings = Settings(length=SIZE, piece=piece)
+        ridges = wanted_ridges(sample_surface(PointCloud.from_array(both), settings), settings)
+        assert len(ridges) == 12
+        places = np.concatenate([ridge.places for ridge in ridges])
+        origin = PointCloud.from_array(both).origin
+        assert np.abs(places[:, 0] + origin[0] - middle).max() < 20.0
+    everything = Settings(length=SIZE, piece="all")
+    assert len(wanted_ridges(sample_surface(PointCloud.from_array(both), everything), everything)) == 24

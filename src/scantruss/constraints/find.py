@@ -10,6 +10,7 @@ import numpy as np
 
 from ..boundary.find import Boundary, with_line_ends
 from ..errors import Place
+from ..kernels.mesh.point_location import nearest_sample
 from .fixed_lines import add_polylines
 from .fixed_nodes import check_positions
 from .network import NO_LINES, Lines, Network
@@ -69,8 +70,16 @@ def find_constraints(
 def wanted_ridges(samples: SurfaceSamples, settings: Settings) -> list[Ridge]:
     """Return the ridges that the grid is to follow; see `ridges.find_ridges`."""
     wanted = settings.ridge_angle > 0.0 and settings.method == "default" and not samples.smooth
-    ridges = find_ridges(samples, settings) if wanted else []
+    ridges = [ridge for ridge in find_ridges(samples, settings) if _on_pieces(ridge, samples)] if wanted else []
     return without(ridges, [np.array(place, float) - samples.origin for place in settings.no_ridge_at], settings.length)
+
+
+def _on_pieces(ridge: Ridge, samples: SurfaceSamples) -> bool:
+    """Whether a ridge lies on the pieces of the scan that get a grid, for the most part."""
+    if samples.kept.all():
+        return True
+    nearest = [nearest_sample(samples.surface, *place) for place in ridge.places.tolist()]
+    return bool(samples.kept[nearest].mean() > 0.5)
 
 
 def find_lines(samples: SurfaceSamples, boundary: Boundary, ridges: list[Ridge], settings: Settings) -> Lines:
