@@ -154,6 +154,20 @@ def test_more_than_one_percent_missed_by_half_a_member_is_a_warning_with_its_pla
     assert "missed" not in {warning.kind for warning in places_to_look_at(small, (0.0, 0.0, 0.0))}
 
 
+def test_what_is_rounded_off_by_a_quarter_of_a_member_is_a_warning() -> None:
+    points = sheet(13, 7, 0.08, keep=lambda x, y: abs(x - y / 3**0.5) < 4.2)
+    points[:, 2] = 0.4 * np.exp(-((points[:, 0] / 1.2) ** 2 + (points[:, 1] / 1.2) ** 2))
+    samples, grid = scanned(points, lattice())
+    share = (np.abs(points[:, 2]) > 0.25).mean()  # all of the bump is nearer than half a member
+    found = certify(grid, samples, NOTHING, SETTINGS)
+    (warning,) = (warning for warning in found.warnings if warning.kind == "rounded")
+    assert warning.words.startswith(f"rounds off {share:.0%} of the points by more than a quarter")
+    assert np.hypot(*known(warning.where)[:2]) < 0.5
+    points[:, 2] *= 0.6
+    samples, grid = scanned(points, lattice())
+    assert "rounded" not in {warning.kind for warning in certify(grid, samples, NOTHING, SETTINGS).warnings}
+
+
 def test_a_refusal_names_the_setting_that_accepts_it_only_where_that_is_enough(monkeypatch: pytest.MonkeyPatch) -> None:
     samples, grid = scanned(sheet(13, 8, 0.08), lattice())
     boundary = steps_of(st.PointCloud.from_array(sheet(13, 8, 0.08)), SETTINGS).boundary

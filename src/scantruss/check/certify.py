@@ -23,7 +23,7 @@ from .folds import fold_angles
 from .gaps import bridged_gaps
 from .irregular import count_irregular
 from .left_out import OTHER_PIECES, parts_left_out
-from .limits import limits_of, places_to_look_at, widened_limits
+from .limits import ROUNDED_BY, limits_of, places_to_look_at, widened_limits
 from .sheets import faults_on_sheets, nodes_of_samples
 
 if TYPE_CHECKING:
@@ -78,7 +78,8 @@ def certify(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings: S
     known = {fault.kind for fault in faults}
     faults += [fault for fault in (*too_far, *faults_on_sheets(grid, samples, nearest)) if fault.kind not in known]
     missed_at = place_of(samples.scan[_missed(grid, samples, found, length)] + samples.origin)
-    warnings = (*poor, *bridged, *doubtful, *places_to_look_at(certificate, missed_at))
+    rounded = _rounded(grid, samples, found, length)
+    warnings = (*poor, *bridged, *doubtful, *places_to_look_at(certificate, missed_at, rounded))
     return replace(certificate, faults=tuple(faults), warnings=warnings, widened=widened_limits(settings))
 
 
@@ -192,6 +193,13 @@ def _missed(grid: Grid, samples: SurfaceSamples, found: Distances, length: float
     """Return which point is the farthest from the grid of those that are not named otherwise: kept and within a member."""
     members = _desired(grid, length)[grid.triangles].mean(axis=1)[found.triangle]
     return int(np.where((samples.judged == KEPT) & (found.scan <= members), found.scan / members, -1.0).argmax())
+
+
+def _rounded(grid: Grid, samples: SurfaceSamples, found: Distances, length: float) -> float:
+    """Return the share of the points that a grid rounds off: kept ones beyond `ROUNDED_BY` that are not missed."""
+    members = _desired(grid, length)[grid.triangles].mean(axis=1)[found.triangle]
+    off = (found.scan > ROUNDED_BY * members) & (found.scan <= COVER_REACH * members)
+    return float(((samples.judged == KEPT) & off).mean())
 
 
 def _spread(values: np.ndarray, places: np.ndarray, grid: Grid, weight: np.ndarray) -> Spread | None:

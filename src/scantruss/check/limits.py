@@ -27,6 +27,8 @@ WARN_FOLD = 45.0  # angle between neighbouring triangles below which the fold is
 WARN_OFFSET = 0.05  # distance of a node from the scan, beyond its noise, from which on that is poor [member lengths]
 NOISES_OFF = 3.0  # rms distances of points from their plane that are noise
 PLACES_KEPT = 30  # places of a fault that are kept, the worst first
+ROUNDED_BY = 0.25  # distance from the grid above which a point is rounded off [member lengths]
+WARN_ROUNDED = 0.03  # share of the points that a grid may round off without a word
 WARN_LEFT_OUT = 0.01  # share of the points that a grid may miss, and ScanTruss may leave out by itself, without a word
 
 
@@ -113,10 +115,11 @@ def _inner_angles(grid: Grid) -> np.ndarray:
     return angles
 
 
-def places_to_look_at(found: Certificate, missed_at: Place) -> list[Fault]:
+def places_to_look_at(found: Certificate, missed_at: Place, rounded: float = 0.0) -> list[Fault]:
     """Return warnings of what a grid leaves out: each place farther than a member, and much that it misses or ScanTruss left out.
 
     missed_at : the worst place that it misses by less than a member
+    rounded : share of the points that lie farther than `ROUNDED_BY` members from the grid, but not so far that it misses them
     """
     unit = f" {found.unit}" if found.unit else ""
     warnings = [
@@ -127,6 +130,11 @@ def places_to_look_at(found: Certificate, missed_at: Place) -> list[Fault]:
     if found.missing > WARN_LEFT_OUT:
         words = f"misses {found.missing:.1%} of the points by more than half a member"
         warnings.append(Fault("missed", words, missed_at))
+    if rounded > WARN_ROUNDED:
+        words = (
+            f"rounds off {rounded:.0%} of the points by more than a quarter of a member; shorter members follow them"
+        )
+        warnings.append(Fault("rounded", words, missed_at))
     if found.judged_out > WARN_LEFT_OUT:
         warnings.append(Fault("left out", f"leaves out {found.judged_out:.1%} of the points that were read"))
     return warnings
