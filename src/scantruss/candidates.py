@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, TypeVar
 
+from .attempts import VERY_ROUGH_SCAN
 from .check.certify import checked, passed_grid
 from .errors import FrontError, Place
 from .front.advance import advance_front
@@ -162,7 +163,7 @@ def best_that_passes(
             grid = improve_last(candidate.mesh, candidate.front, samples, constraints, candidate.settings)
             grid = finish_rings(grid, boundary)
             candidate.grid = checked(grid.replace(settings=settings), samples, boundary, settings)
-            if misses_at_most(candidate.grid, MOST_MISSED):
+            if samples.rough <= VERY_ROUGH_SCAN and misses_at_most(candidate.grid, MOST_MISSED):
                 reach_tips_of(candidate, samples, boundary, constraints, settings)
             candidate.grid = passed_grid(candidate.grid)
         except FrontError as error:

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 POOR_ANGLE_MARGIN = 5.0  # an angle is poor that is not by so much larger than the least allowed [degree]
 POOR_FOLD_MARGIN = 5.0  # two triangles are folded whose angle is not by so much larger than the least allowed [degree]
 POOR_LENGTH_MARGIN = 0.06  # a member is poor that is not by so much within the lengths allowed [desired length]
-MOST_POOR_PLACES = 16  # poor places that are mended at most; where there are more, the whole grid is
+MOST_POOR_PLACES = 16  # poor triangles that are mended at most; where there are more, the whole grid is poor
 MENDING_ENERGY = 1.5  # most energy that mending a place may cost
 SWEEPS_OF_TRIAL = 8  # sweeps in which the nodes around a move settle
 LEAST_MENDED = 0.02  # least part of a limit by which a move must mend
