@@ -196,7 +196,12 @@ def _missed(grid: Grid, samples: SurfaceSamples, found: Distances, length: float
 
 
 def _rounded(grid: Grid, samples: SurfaceSamples, found: Distances, length: float) -> float:
-    """Return the share of the points that a grid rounds off: kept ones beyond `ROUNDED_BY` that are not missed."""
+    """Return the share of the points that a grid rounds off: kept ones beyond `ROUNDED_BY` that are not missed.
+
+    None of a rough scan that was smoothed: its roughness is told as scatter.
+    """
+    if samples.moved:
+        return 0.0
     members = _desired(grid, length)[grid.triangles].mean(axis=1)[found.triangle]
     off = (found.scan > ROUNDED_BY * members) & (found.scan <= COVER_REACH * members)
     return float(((samples.judged == KEPT) & off).mean())
