@@ -188,7 +188,8 @@ class Tracer:
         """Folds stride by stride to one side of a first one; whether they came to the goal, which closes a ring."""
         ahead, at = sign * fold[3:6], fold
         steps: list[np.ndarray] = []
-        known = np.concatenate([np.zeros((0, 3)), *others])
+        known, own = np.concatenate([np.zeros((0, 3)), *others]), np.empty((MOST_PLACES_OF_FOLD, 3))
+        meets = FOLDS_MEET_WITHIN * self.length
         missed = 0
         while len(steps) < MOST_PLACES_OF_FOLD and missed <= MISSED_PLACES:
             stride = (1 + missed) * FOLD_STRIDE * self.length
@@ -204,10 +205,12 @@ class Tracer:
             after[3:6] *= np.sign(after[3:6] @ ahead)
             steps.append(after)
             at, ahead, missed = after, after[3:6], 0
-            if len(steps) > PLACES_OF_SHORTEST_RING and np.linalg.norm(at[:3] - goal) < 0.6 * stride:
+            if len(steps) > PLACES_OF_SHORTEST_RING and np.linalg.norm(at[:3] - goal) < meets:
                 return steps, True
-            if len(known) and ((known - at[:3]) ** 2).sum(axis=1).min() < (FOLDS_MEET_WITHIN * self.length) ** 2:
-                break
+            own[len(steps) - 1] = at[:3]
+            for places in (known, own[: max(len(steps) - PLACES_OF_SHORTEST_RING, 0)]):
+                if len(places) and ((places - at[:3]) ** 2).sum(axis=1).min() < meets**2:
+                    return steps, False
         return steps, False
 
     def _goes_on(self, fold: np.ndarray, place: np.ndarray, ahead: np.ndarray) -> bool:
