@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import re
 import weakref
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -13,6 +14,11 @@ from ..errors import InputError
 from ..scan.cloud import PointCloud
 from ..settings import Settings
 from ..surface.samples import sample_surface
+from .picking import nearest_point
+
+if TYPE_CHECKING:
+    from .session import Session
+    from .view import StudioView
 
 AROUND_LINE = 16  #: points of the scan to whose plane a place on a line is brought
 STEP_OF_LINE = 0.5  #: largest distance of the points of a line [member length]
@@ -59,6 +65,34 @@ class ScannedPoints:
 
 
 _SCANNED: weakref.WeakKeyDictionary[PointCloud, ScannedPoints] = weakref.WeakKeyDictionary()
+
+
+def scanned_points(session: Session) -> ScannedPoints:
+    """Return the points of the scan of a session.
+
+    Raises
+    ------
+    InputError
+        There is none.
+    """
+    if session.cloud is None:
+        raise InputError("there is no scan yet; open one")
+    return ScannedPoints.of(session.cloud, session.settings)
+
+
+def clicked_point(view: StudioView, origin: np.ndarray, ahead: np.ndarray) -> np.ndarray:
+    """Return the point (3,) of the scan under a ray of the scene from `origin` (3,) in direction `ahead` (3,) [scan unit].
+
+    Raises
+    ------
+    InputError
+        There is none.
+    """
+    places = scanned_points(view.session).places
+    found = nearest_point(view.frame.to_scene(places), origin, ahead, view.near)
+    if found is None:
+        raise InputError("no point of the scan is there; click on the scan")
+    return np.asarray(places[found], float)
 
 
 def numbers_of(text: str, needed: int, what: str) -> tuple[float, ...]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..errors import InputError
 from .dragging import DraggedBalls
-from .drawn_lines import ScannedPoints, numbers_of
+from .drawn_lines import clicked_point, numbers_of
 from .frame import SceneFrame
 from .picking import nearest_point
 
@@ -74,17 +74,7 @@ class FixedNodes:
         if len(places) and (there := nearest_point(places, origin, ahead)) is not None:
             self._show(there)
             return
-        scanned = self._scanned().places
-        found = nearest_point(frame.to_scene(scanned), origin, ahead, self.view.near)
-        if found is None:
-            raise InputError("no point of the scan is there; click on the scan")
-        self._set(tuple(scanned[found].tolist()), len(self._fixed))
-
-    def _scanned(self) -> ScannedPoints:
-        session = self.view.session
-        if session.cloud is None:
-            raise InputError("there is no scan yet; open one")
-        return ScannedPoints.of(session.cloud, session.settings)
+        self._set(tuple(clicked_point(self.view, origin, ahead).tolist()), len(self._fixed))
 
     def _choose(self) -> None:
         self._show(self._number() if self.chosen.value != NONE_CHOSEN else -1)

@@ -13,9 +13,8 @@ from ..scan.cloud import PointCloud
 from ..settings import Settings
 from .colours import colors_of, legend_of
 from .dragging import place_under
-from .drawn_lines import ScannedPoints
+from .drawn_lines import ScannedPoints, clicked_point
 from .frame import SceneFrame
-from .picking import nearest_point
 
 if TYPE_CHECKING:
     from .state import StudioState
@@ -97,13 +96,7 @@ class LengthBrush:
             raise InputError(f"{text.label} needs a number, got {text.value!r}") from None
 
     def _click(self, origin: np.ndarray, ahead: np.ndarray) -> None:
-        session = self.view.session
-        assert session.cloud is not None
-        scanned = ScannedPoints.of(session.cloud, session.settings).places
-        found = nearest_point(self.view.frame.to_scene(scanned), origin, ahead, self.view.near)
-        if found is None:
-            raise InputError("no point of the scan is there; click on the scan")
-        self._finish(self._dabbed(session.settings, scanned[found]))
+        self._finish(self._dabbed(self.view.session.settings, clicked_point(self.view, origin, ahead)))
 
     def _dabbed(self, settings: Settings, place: np.ndarray) -> Settings:
         """Return settings with a dab at a place of the scan (3,)."""

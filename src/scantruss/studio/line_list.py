@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError
-from .drawn_lines import ScannedPoints, points_of
+from .drawn_lines import clicked_point, points_of, scanned_points
 from .fixed_list import NONE_CHOSEN
 from .frame import SceneFrame
-from .picking import nearest_point
 
 if TYPE_CHECKING:
     from .state import StudioState
@@ -52,24 +51,14 @@ class LineList:
         else:
             self._delete()
 
-    def _scanned(self) -> ScannedPoints:
-        session = self.view.session
-        if session.cloud is None:
-            raise InputError("there is no scan yet; open one")
-        return ScannedPoints.of(session.cloud, session.settings)
-
     def _begin(self) -> None:
-        self._scanned()
+        scanned_points(self.view.session)
         self._points = []
         self.view.click.value = DRAW_MODE
         self._show_points()
 
     def _click(self, origin: np.ndarray, ahead: np.ndarray) -> None:
-        scanned = self._scanned().places
-        found = nearest_point(self.view.frame.to_scene(scanned), origin, ahead, self.view.near)
-        if found is None:
-            raise InputError("no point of the scan is there; click on the scan")
-        self._points.append(scanned[found])
+        self._points.append(clicked_point(self.view, origin, ahead))
         self._show_points()
 
     def _go_on(self, way: str) -> None:
@@ -89,7 +78,7 @@ class LineList:
             places = np.array(self._points)
             scene.points("/drawn points", self.view.frame.to_scene(places), np.array(CHOSEN_LINE_COLOR, np.uint8), 0.12)
             if len(places) > 1:
-                over = self._scanned().along(places, self.view.session.settings.length)
+                over = scanned_points(self.view.session).along(places, self.view.session.settings.length)
                 scene.chain("/drawn", self.view.frame.to_scene(over), False, CHOSEN_LINE_COLOR, DRAWN_LINE_WIDTH)
 
     def _add(self, points: np.ndarray) -> None:
@@ -97,7 +86,7 @@ class LineList:
         if len(points) < 2:
             raise InputError("a line needs two points at least")
         session = self.view.session
-        over = self._scanned().along(points, session.settings.length)
+        over = scanned_points(self.view.session).along(points, session.settings.length)
         line = tuple(tuple(float(f"{c:.{SIGNIFICANT_OF_LINE}g}") for c in place) for place in over.tolist())
         names = session.settings.line_names
         if names:

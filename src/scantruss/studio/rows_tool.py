@@ -6,11 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import InputError
 from .dragging import DraggedBalls
-from .drawn_lines import ScannedPoints, numbers_of
+from .drawn_lines import ScannedPoints, clicked_point, numbers_of
 from .frame import SceneFrame
-from .picking import nearest_point
 from .scene import barbed
 
 if TYPE_CHECKING:
@@ -47,20 +45,15 @@ class RowsTool:
         self.view.click.value = ROWS_MODE
 
     def _click(self, origin: np.ndarray, ahead: np.ndarray) -> None:
-        session = self.view.session
-        assert session.cloud is not None
-        scanned = ScannedPoints.of(session.cloud, session.settings).places
-        found = nearest_point(self.view.frame.to_scene(scanned), origin, ahead, self.view.near)
-        if found is None:
-            raise InputError("no point of the scan is there; click on the scan")
+        place = clicked_point(self.view, origin, ahead)
         if self._begin is None:
-            self._begin = scanned[found]
-            at = self.view.frame.to_scene(scanned[found][None])
+            self._begin = place
+            at = self.view.frame.to_scene(place[None])
             self.view.scene.points("/rows", at, np.array(ROWS_COLOR, np.uint8), 0.12)
             return
         begin, self._begin = self._begin, None
         self.view.click.value = self.view.clicks[0]
-        self._set(begin, scanned[found])
+        self._set(begin, place)
 
     def _set(self, begin: np.ndarray, end: np.ndarray) -> None:
         arrow = tuple(float(f"{number:.9g}") for number in (*begin.tolist(), *(end - begin).tolist()))

@@ -12,9 +12,8 @@ from ..errors import InputError
 from ..scan.symmetry import SYMMETRY_TOLERANCE, nearest_mirror_plane
 from ..settings.values import ROTATION_NUMBERS, SYMMETRIES_FOUND
 from .dragging import DraggedBalls
-from .drawn_lines import ScannedPoints, numbers_of
+from .drawn_lines import ScannedPoints, clicked_point, numbers_of
 from .frame import DRAWN_EXTENT, SceneFrame
-from .picking import nearest_point
 
 if TYPE_CHECKING:
     from .state import StudioState
@@ -74,19 +73,14 @@ class SymmetryTool:
         self.view.click.value = PLANE_MODE
 
     def _click(self, origin: np.ndarray, ahead: np.ndarray) -> None:
-        session = self.view.session
-        assert session.cloud is not None
-        scanned = ScannedPoints.of(session.cloud, session.settings).places
-        found = nearest_point(self.view.frame.to_scene(scanned), origin, ahead, self.view.near)
-        if found is None:
-            raise InputError("no point of the scan is there; click on the scan")
+        place = clicked_point(self.view, origin, ahead)
         if self._begin is None:
-            self._begin = scanned[found]
+            self._begin = place
             self._balls.show(self.view.frame.to_scene(self._begin[None]), np.array(PLANE_COLOR, np.uint8), PLANE_RADIUS)
             return
         begin, self._begin = self._begin, None
         self.view.click.value = self.view.clicks[0]
-        self._set_drawn(upright_plane(begin, scanned[found]))
+        self._set_drawn(upright_plane(begin, place))
 
     def _moved(self, number: int, place: np.ndarray) -> tuple[float, ...]:
         """Return the plane with one of its ends at another place."""
