@@ -8,7 +8,9 @@ from marks import compiled_only
 from rough import Rough, rough_disc, rough_sphere, same_topology
 from steps import boundary_of, optimized
 
-from scantruss import Grid, InputError, Settings
+from scantruss import Grid, InputError, PointCloud, Settings
+from scantruss.constraints.fixed_nodes import check_positions
+from scantruss.surface.samples import sample_surface
 
 MAKERS: dict[str, Callable[[], Rough]] = {
     "disc": rough_disc,
@@ -144,3 +146,13 @@ def test_a_refusal_names_the_unit() -> None:
 
     with pytest.raises(InputError, match="mm away from the scan"):
         optimized(rough.grid, replace(rough.cloud, unit="mm"), Settings(length=0.22), [(9, 9, 9)])
+
+
+def test_a_position_off_the_scan_comes_with_the_nearest_point() -> None:
+    points = rough_disc(points=2000).cloud.points + [100.0, 200.0, 300.0]
+    far = np.array([100.2, 200.1, 305.0])
+    cloud, settings = PointCloud.from_array(points), Settings(length=0.3)
+    with pytest.raises(InputError, match=r"; the nearest point is \(") as refused:
+        check_positions([far.tolist()], sample_surface(cloud, settings), settings.length)
+    named = np.array([float(word) for word in str(refused.value).rsplit("(", 1)[1].rstrip(")").split(",")])
+    assert np.allclose(named, points[np.linalg.norm(points - far, axis=1).argmin()], atol=1e-6)

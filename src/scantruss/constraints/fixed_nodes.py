@@ -27,9 +27,11 @@ def check_positions(
         distance = distance_from_scan(samples.surface, place)
         local = length * local_field(samples.surface, place)
         if distance > 0.5 * local:
+            points = samples.measured_points
+            nearest = points[((points - place) ** 2).sum(axis=1).argmin()] + samples.origin
             raise InputError(
                 f"fixed position {place_text(places[k])} is {distance:.4g}{unit} away from the scan;"
-                f" it must lie within half a member, {0.5 * local:.4g}{unit}"
+                f" it must lie within half a member, {0.5 * local:.4g}{unit}; the nearest point is {place_text(nearest)}"
             )
         gaps = np.linalg.norm(relative[:k] - place, axis=1)
         if k and gaps.min() < 0.5 * local * (1 - 1e-9):
