@@ -202,12 +202,10 @@ def reach_tips_of(
     """
     mesh, of_scan = candidate.mesh, (candidate.front, samples, constraints, candidate.settings)
 
-    def faults_of(grid: Grid, cost: float) -> list[Place] | None:
-        """Take the grid that the mesh has become where it is better; else return the places of what went wrong in it."""
-        before, candidate.grid = (
-            candidate.grid,
-            checked(finish_rings(grid, boundary).replace(settings=settings), samples, boundary, settings),
-        )
+    def try_to_take(grid: Grid, cost: float) -> list[Place] | None:
+        """Take the grid that the mesh has become where it is better than that of a cost; else return the places of its faults."""
+        before = candidate.grid
+        candidate.grid = checked(finish_rings(grid, boundary).replace(settings=settings), samples, boundary, settings)
         if misses_at_most(candidate.grid, MOST_MISSED) and candidate.cost_of_tips < cost:
             return None
         found = candidate.grid.certificate
@@ -220,7 +218,7 @@ def reach_tips_of(
     for _ in range(TURNS_OF_TIPS if settings.method == "default" else 0):
         kept, cost = mesh.copied(), candidate.cost_of_tips
         grid = with_tips(mesh, *of_scan, given_up)
-        places = faults_of(grid, cost) if grid is not None else []
+        places = try_to_take(grid, cost) if grid is not None else []
         if places is None:
             reached = True
             continue
@@ -231,7 +229,7 @@ def reach_tips_of(
         given_up += again
     if reached and settings.effort != "quick":
         kept, cost = mesh.copied(), candidate.cost_of_tips
-        if faults_of(searched_again(mesh, *of_scan), cost) is not None:
+        if try_to_take(searched_again(mesh, *of_scan), cost) is not None:
             mesh.restore(kept)
 
 

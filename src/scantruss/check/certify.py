@@ -189,20 +189,26 @@ def _desired(grid: Grid, length: float) -> np.ndarray:
     return np.full(len(grid.nodes), length) if grid.desired is None else grid.desired
 
 
+def _desired_at_points(grid: Grid, found: Distances, length: float) -> np.ndarray:
+    """Return the desired length at each point that was read (N,): that of the nearest triangle."""
+    lengths: np.ndarray = _desired(grid, length)[grid.triangles].mean(axis=1)[found.triangle]
+    return lengths
+
+
 def _missed(grid: Grid, samples: SurfaceSamples, found: Distances, length: float) -> int:
     """Return which point is the farthest from the grid of those that are not named otherwise: kept and within a member."""
-    members = _desired(grid, length)[grid.triangles].mean(axis=1)[found.triangle]
+    members = _desired_at_points(grid, found, length)
     return int(np.where((samples.judged == KEPT) & (found.scan <= members), found.scan / members, -1.0).argmax())
 
 
 def _rounded(grid: Grid, samples: SurfaceSamples, found: Distances, length: float) -> float:
     """Return the share of the points that a grid rounds off: kept ones beyond `ROUNDED_BY` that are not missed.
 
-    None of a rough scan that was smoothed: its roughness is told as scatter.
+    None of a rough scan that was smoothed: its roughness is the scatter.
     """
     if samples.moved:
         return 0.0
-    members = _desired(grid, length)[grid.triangles].mean(axis=1)[found.triangle]
+    members = _desired_at_points(grid, found, length)
     off = (found.scan > ROUNDED_BY * members) & (found.scan <= COVER_REACH * members)
     return float(((samples.judged == KEPT) & off).mean())
 

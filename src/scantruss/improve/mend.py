@@ -6,12 +6,11 @@ at a poor triangle is tried, and the one that mends most is kept.
 
 from __future__ import annotations
 
-from itertools import product
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..kernels.mesh.figures import angles_of
+from ..kernels.mesh.figures import angles_of, folds_of
 from ..kernels.mesh.grid import list_triangles
 from ..kernels.mesh.local_search import COLLAPSE, FLIP, SPLIT, is_allowed, make_move
 from ..kernels.mesh.trial import Scratch, gather, total_energy
@@ -73,10 +72,10 @@ def poor_places(mesh: WorkingMesh, settings: Settings) -> PoorPlaces:
     fixed = mesh.fixed[triangles] & mesh.fixed[after]
     least, most = settings.min_length + POOR_LENGTH_MARGIN, settings.max_length - POOR_LENGTH_MARGIN
     off = np.where(fixed, 0.0, np.maximum(1.0 - sizes / least, sizes / most - 1.0))
-    wide = settings.min_angle + POOR_ANGLE_MARGIN
+    narrowest = settings.min_angle + POOR_ANGLE_MARGIN
     flat = 1.0 - fold_angles_of(net.nodes, triangles) / (settings.min_fold + POOR_FOLD_MARGIN)
     held = np.asarray(mesh.fixed[triangles].all(axis=1))
-    narrow = np.where(held[:, None], 0.0, 1.0 - angles / wide)
+    narrow = np.where(held[:, None], 0.0, 1.0 - angles / narrowest)
     faults = sum(np.maximum(part, 0.0).sum(axis=1) for part in (off, narrow, flat))
     order = np.argsort(-faults, kind="stable")[: int((faults > 0.0).sum())]
     return PoorPlaces(float(faults.sum()), triangles[order])
@@ -89,11 +88,9 @@ def fold_angles_of(nodes: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     order = np.argsort(key, kind="stable")
     same = np.flatnonzero(key[order][1:] == key[order][:-1])
     sides = np.stack([order[same], order[same + 1]], axis=1)
-    across = np.cross(*(nodes[triangles[:, k]] - nodes[triangles[:, 0]] for k in (1, 2)))
-    across /= np.maximum(np.linalg.norm(across, axis=1), 1e-300)[:, None]
-    cosine = (across[sides[:, 0] // 3] * across[sides[:, 1] // 3]).sum(axis=1)
-    angles = np.full(len(ends), 180.0)
-    angles[sides] = 180.0 - np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))[:, None]
+    between, angles = np.empty(len(sides)), np.full(len(ends), 180.0)
+    folds_of(nodes, triangles, sides // 3, between)
+    angles[sides] = between[:, None]
     return angles.reshape(-1, 3)
 
 
@@ -106,8 +103,10 @@ def _mend(
         return float(total_energy(mesh.net, mesh.patches, scratch, mesh.length, LENGTH_WEIGHT)[0])
 
     start, best, least, most = mesh.copied(), None, poor.faults - LEAST_MENDED, energy() + MENDING_ENERGY
-    pairs = list(zip(triangle, (*triangle[1:], triangle[0]), strict=True))
-    for move, (a, b) in [*product((FLIP, SPLIT), pairs), *product((COLLAPSE,), pairs + [(b, a) for a, b in pairs])]:
+    sides = list(zip(triangle, (*triangle[1:], triangle[0]), strict=True))
+    moves = [(move, *side) for move in (FLIP, SPLIT, COLLAPSE) for side in sides]
+    moves += [(COLLAPSE, b, a) for a, b in sides]
+    for move, a, b in moves:
         if not is_allowed(mesh.net, move, a, b, mesh.length):
             continue
         gather(mesh.net, scratch, a, b)

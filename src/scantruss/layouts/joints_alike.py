@@ -214,9 +214,10 @@ def _directed_boundary(grid: Grid) -> list[tuple[int, int]]:
 
 def _kinds(near: np.ndarray, used: np.ndarray) -> np.ndarray:
     """Return nodes that stand for all that are used, each time that which the most others are near to (V, V)."""
-    held = (near & used).sum(axis=1) * used
+    near = near | np.eye(len(used), dtype=bool)  # whatever the rounding
+    held = (near & used).sum(axis=1) * used  # how many of the nodes left each is near to
     left, found = used.copy(), []
-    while left.any():  # each turn takes one at least: a node is near to itself
+    while left.any():  # ends: each node left is near to itself, so that each turn takes one at least
         best = int(held.argmax())
         found.append(best)
         gone = left & near[best]

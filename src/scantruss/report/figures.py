@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 MOST_LINES = 6  # lines of a kind that are named one by one
-OUTLIERS_WIDEN = 0.05  # share of the extent by which outliers make that of all points larger, from which it is told
+OUTLIERS_WIDEN = 0.05  # share of the extent by which outliers make that of all points larger, from which both are given
 
 
 def report_of(grid: Grid, points: int) -> dict[str, Any]:

@@ -132,7 +132,7 @@ def _apart(places: np.ndarray, gap: float) -> np.ndarray:
     groups: list[tuple[float, int]] = []  # mean and number of places that are moved together, their gaps taken off
     for place in (places - gap * np.arange(len(places))).tolist():
         mean, count = place, 1
-        while groups and groups[-1][0] > mean:  # each turn takes a group away
+        while groups and groups[-1][0] > mean:  # ends: each turn takes a group away
             other, more = groups.pop()
             mean, count = (mean * count + other * more) / (count + more), count + more
         groups.append((mean, count))

@@ -83,7 +83,9 @@ def largest_eigenpairs(
         basis.enter(vector)
     table = np.zeros((BASIS_SIZE, BASIS_SIZE))  # the operator within the basis; what leads out of it stands below
     first = 0
-    while basis.count <= BASIS_SIZE - block:  # ends: each turn adds vectors, or has none to add and returns
+    while (
+        basis.count <= BASIS_SIZE - block
+    ):  # ends: each turn adds vectors, `block` at most, or has none to add and returns
         last = basis.count
         for number in range(first, last):
             along = basis.enter(factor.solve(matrix @ basis.vectors[number]))

@@ -10,7 +10,7 @@ LEAST_PART = 4  #: nodes that are not divided further
 
 
 def dissected(truss: Truss) -> np.ndarray:
-    """Return the rank (V,) of each node: halves by their longest side first, then the nodes between them, and so on in each half.
+    """Return the rank (V,) of each node: two parts along the longest side first, then the nodes between them, and so on in each part.
 
     All parts of one depth are divided at once.
     """
@@ -20,7 +20,7 @@ def dissected(truss: Truss) -> np.ndarray:
     end = np.array([count])  # the rank after the last one of each part
     left = np.arange(count)  # nodes without a rank
     members = truss.members
-    while len(left):  # ends: a part gives its nodes ranks, or is divided into smaller ones
+    while len(left):  # ends: a part of four nodes at most gives them ranks, any other is divided into smaller ones
         order, first, size = _along_longest_sides(truss.nodes[left], part[left], len(end))
         left = left[order]
         mine = part[left]

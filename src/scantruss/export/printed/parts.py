@@ -168,13 +168,14 @@ def build_parts(
         edges = np.where((along < 0)[:, None], edges[:, ::-1], edges)  # from the side with pegs to that with sockets
     balls = balls_of(grid, used, nodes, node / 2, sides, marks)
     whole = bars_of(nodes, edges, member / 2, sides)
-    halves = _halves(nodes, edges)
-    at_ends = [bars_of(*half, member / 2, sides) for half in halves]
+    half_members = _half_members(nodes, edges)
+    at_ends = [bars_of(*half, member / 2, sides) for half in half_members]
     if marks:
         whole = marked_bars(grid, nodes, edges, whole, member / 2, (node / 2,) * 2, sides)
         taken = node / 2, joint.reach
         at_ends = [
-            marked_bars(grid, *half, bars, member / 2, taken, sides) for half, bars in zip(halves, at_ends, strict=True)
+            marked_bars(grid, *half, bars, member / 2, taken, sides)
+            for half, bars in zip(half_members, at_ends, strict=True)
         ]
     normals = outer_normals(grid)[used]
     names = numbered("part ", int(part_of.max()) + 1, 1)
@@ -221,8 +222,8 @@ def check_apart(parts: list[PrintedPart]) -> None:
             )
 
 
-def _halves(nodes: np.ndarray, edges: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Return the halves of the members from their starts, then from their ends: nodes and middles (V + E, 3), and their numbers (E, 2)."""
+def _half_members(nodes: np.ndarray, edges: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Return the members from start to middle, then from end to middle: nodes and middles (V + E, 3), and their numbers (E, 2)."""
     middles = len(nodes) + np.arange(len(edges))
     places = np.concatenate([nodes, nodes[edges].mean(axis=1)])
     return [(places, np.stack([end, middles], axis=1)) for end in edges.T]
