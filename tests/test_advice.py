@@ -174,8 +174,9 @@ def test_a_suggestion_and_its_table_cost_no_more_than_so_many_grids_and_points(
     assert 1 <= len(made) <= LEAST_TRIED
 
 
-def test_of_lengths_that_pass_one_is_suggested_that_is_followed_by_another() -> None:
+def test_of_lengths_that_pass_one_is_suggested_that_is_followed_by_another(monkeypatch: pytest.MonkeyPatch) -> None:
     advice = Advice(cloud_of("limpet"), st.Settings(length=1.0))
+    monkeypatch.setattr(Advice, "_count_at", lambda *_: None)
     usual, passed = advice._usual, cast(Any, SimpleNamespace(certificate=None))
     shorter = round_length(usual / 1.3, "nearest")
     advice._left = 0.0  # nothing else is tried

@@ -7,6 +7,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from .boundary.find import find_boundary
+from .cells.make import settings_of_triangles
+from .constraints.find import ridges_away_from
 from .constraints.ridges import find_ridges
 from .errors import CertificateError, FrontError, OneSidedError, ScanTrussError
 from .front.orientation_field import FieldStart
@@ -47,18 +50,23 @@ class Attempt:
     )
     faults: tuple[tuple[float, float, float], ...] = ()  #: places at which ridges are given up [scan unit]
 
-    def after(self, fault: FrontError) -> Attempt | None:
-        """The same attempt with the ridges given up where it failed; None where that is not known or follows no ridge."""
+    def after(self, fault: FrontError, cloud: PointCloud) -> Attempt | None:
+        """The same attempt with the ridges given up where it failed; None where that is not known or no ridge is near."""
         found = fault.grid.certificate if fault.grid is not None else None
         places = [each.where for each in found.faults if each.where] if found is not None else []
         places += [fault.where] if fault.where else []
         new = tuple(dict.fromkeys(place for place in places if place not in self.faults))
         follows = self.settings.ridge_angle > 0.0 and self.settings.method == "default" and self.starts is None
-        return (
-            replace(self, faults=self.faults + new)
-            if new and follows and len(self.faults) < FAULTS_WITHOUT_RIDGES
-            else None
-        )
+        if not new or not follows or len(self.faults) >= FAULTS_WITHOUT_RIDGES:
+            return None
+        later = replace(self, faults=self.faults + new)
+        return later if later.ridge_points(cloud) < self.ridge_points(cloud) else None
+
+    def ridge_points(self, cloud: PointCloud) -> int:
+        """Return by how many points the ridges go that this attempt follows."""
+        settings = settings_of_triangles(self.settings)
+        samples, _ = find_boundary(sample_surface(cloud, settings), settings)
+        return sum(len(ridge.places) for ridge in ridges_away_from(self.faults, samples, settings))
 
     def advice(self, fault: ScanTrussError) -> str:
         """Say with which settings a smoothed grid passes that only leaves out too much of the scan; nothing for any other."""
@@ -77,7 +85,11 @@ def attempts(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:
     Rather a grid without ridges than none, or one of the mean surface of a rough scan, or of another look at it: a scan so rough
     that hardly a grid passes is another one to samples that lie a little farther apart. Method "paper" comes last.
     """
-    yield from _same_scan(settings)
+    first, again, *others = _same_scan(settings)
+    yield from (first, again)
+    looks = list(_other_looks(cloud, settings)) if settings.method == "default" else []
+    yield from map(Attempt, looks)  # where edges, limbs or slits are in the way, other fronts seldom help
+    yield from others
     samples = sample_surface(cloud, settings)
     rough, cut = samples.rough, len(samples.rings) > 0
     if cut:  # fewer limbs cut off, then none
@@ -85,12 +97,9 @@ def attempts(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:
             yield Attempt(settings.replace(limb_girth=share * settings.limb_girth))
     if rough > VERY_ROUGH_SCAN:
         yield from _smoothed(cloud, settings)
-    if settings.method == "default":  # opening would cut off sharp edges
-        if not settings.sharp_edges and _has_sharp_edges(cloud, settings):
-            settings = settings.replace(sharp_edges=True)
-            yield from _same_scan(settings)
-        elif not settings.plain_body and not settings.sharp_edges and _is_body(cloud, settings):
-            yield from _same_scan(settings.replace(plain_body=True))
+    for look in looks:
+        yield from list(_same_scan(look))[1:]
+        settings = look if look.sharp_edges else settings
     if settings.keep_rods and settings.method == "default" and _has_rods(cloud, settings):
         settings = settings.replace(keep_rods=False)
         yield from _same_scan(settings)
@@ -130,10 +139,14 @@ def _has_sharp_edges(cloud: PointCloud, settings: Settings) -> bool:
     return bool(on_edge.sum() >= max(FEWEST_NEEDED, EDGE_SHARE * len(on_edge)))
 
 
-def _is_body(cloud: PointCloud, settings: Settings) -> bool:
-    """Whether the scan encloses a body with limbs to take off or slits to fill."""
-    samples = sample_surface(cloud, settings.replace(plain_body=True))
-    return samples.measured < len(samples.surface.mean)
+def _other_looks(cloud: PointCloud, settings: Settings) -> Iterator[Settings]:
+    """Yield the settings that look at sharp edges, or at a body without thin limbs and slits, where the scan has such."""
+    if not settings.sharp_edges and _has_sharp_edges(cloud, settings):
+        yield settings.replace(sharp_edges=True)
+    plain = settings.replace(plain_body=True)
+    samples = sample_surface(cloud, plain)
+    if not settings.plain_body and not settings.sharp_edges and samples.measured < len(samples.surface.mean):
+        yield plain
 
 
 def _has_rods(cloud: PointCloud, settings: Settings) -> bool:
@@ -176,8 +189,8 @@ class AttemptLimit:
     def __init__(self, cells: str = "triangle") -> None:
         self._most = MOST_RUNS if cells == "triangle" else min(MOST_RUNS, MOST_RUNS_OF_CELLS)
         self._allowed = self._most
-        self._settings: Settings | None = None
-        self._far = self._given_up = 0
+        self._far: list[tuple[Settings, int]] = []  # settings, and how many attempts in a row were far from passing
+        self._given_up = 0
         self.runs, self._looks_one_sided = 0, False  #: grids that were made
 
     def allow(self, more: int) -> None:
@@ -200,15 +213,18 @@ class AttemptLimit:
         """Whether an attempt is worth making."""
         if self._looks_one_sided and not attempt.settings.smooth_scale:
             return False
-        return attempt.settings is not self._settings or self._far < MOST_FAR
+        return self._far_in_a_row(attempt.settings) < MOST_FAR
+
+    def _far_in_a_row(self, settings: Settings) -> int:
+        """Return how many attempts of some settings, one after the other, were far from passing."""
+        return next((count for known, count in self._far if known == settings), 0)
 
     def note(self, attempt: Attempt, fault: ScanTrussError) -> None:
         """Note what has come of an attempt."""
-        if attempt.settings is not self._settings:
-            self._settings, self._far = attempt.settings, 0
         self._looks_one_sided |= isinstance(fault, OneSidedError)
-        self._far = self._far + 1 if _is_far_from_passing(attempt, fault) else 0
-        self._given_up += self._far == MOST_FAR and not attempt.settings.smooth_scale  # of those there are four
+        far = self._far_in_a_row(attempt.settings) + 1 if _is_far_from_passing(attempt, fault) else 0
+        self._far = [pair for pair in self._far if pair[0] != attempt.settings] + [(attempt.settings, far)]
+        self._given_up += far == MOST_FAR and not attempt.settings.smooth_scale  # of those there are four
 
 
 def _is_far_from_passing(attempt: Attempt, fault: ScanTrussError) -> bool:

@@ -222,7 +222,7 @@ def make_grid_with_most_ridges(
         try:
             return with_ridges_given_up(make_grid(cloud, later, progress=progress), later.faults)
         except FrontError as error:
-            first, later = first or error, later.after(error)
+            first, later = first or error, later.after(error, cloud)
     assert first is not None
     raise first
 

@@ -59,12 +59,16 @@ def find_constraints(
         leaves the scan.
     """
     positions = check_positions(settings.fixed, samples, settings.length)
-    ridges = wanted_ridges(samples, settings)
-    ridges = cut_around(ridges, np.reshape(faults, (-1, 3)) - samples.origin, settings.length)
+    ridges = ridges_away_from(faults, samples, settings)
     boundary = with_ridge_ends(boundary, ridges, samples, settings.length)
     lines = find_lines(samples, boundary, ridges, settings)
     ended = tuple(with_line_ends(loop, lines.stops_on(k)) for k, loop in enumerate(boundary.loops))
     return replace(boundary, loops=ended), Constraints(positions, lines)
+
+
+def ridges_away_from(faults: Sequence[Place], samples: SurfaceSamples, settings: Settings) -> list[Ridge]:
+    """Return the ridges that the grid is to follow, without what lies near faults, places [scan unit]."""
+    return cut_around(wanted_ridges(samples, settings), np.reshape(faults, (-1, 3)) - samples.origin, settings.length)
 
 
 def wanted_ridges(samples: SurfaceSamples, settings: Settings) -> list[Ridge]:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from ..scan.cloud import PointCloud
     from ..settings import Settings
 
-A_FEW, SOME_MORE = 3, 8  # grids that are made of a length before others are tried, and when it is tried again
+A_FEW, SOME_MORE = 4, 8  # grids that are made of a length before others are tried, and when it is tried again
 #: lengths to try in turn after the usual one, as multiples of it, with how many grids are made of each
 LONGER_FIRST = (
     (1.4, A_FEW), (2.0, A_FEW), (2.8, A_FEW), (1 / 1.4, A_FEW), (2.0, SOME_MORE), (1.4, SOME_MORE), (1.0, SOME_MORE),
@@ -85,6 +85,12 @@ class LengthTrial:
         """Whether the first grid fails as it leaves out too much of the scan."""
         found = getattr(getattr(self.fault, "grid", None), "certificate", None)
         return found is not None and any(fault.kind == "cover" for fault in found.faults)
+
+    @property
+    def loses_limbs(self) -> bool:
+        """Whether the first grid fails as limbs are too thin for its members; longer ones lose more."""
+        found = getattr(getattr(self.fault, "grid", None), "certificate", None)
+        return self.leaves_out and found is not None and any(part.kind == "limbs" for part in found.left_out)
 
     @property
     def lost(self) -> float:
@@ -181,14 +187,16 @@ class Advice:
         """Return the length to take.
 
         It is the first of those tried in turn that passes with what is next above it, both without much of the scan lost; else of
-        those that pass with what is next above them the one that loses least; else one that passes, if there is one with another
-        not far above it that passes too; else the usual length.
+        those that pass with what is next above them the one that loses least; else the next below one that passes, if it passes too;
+        else one that passes, if there is one with another not far above it that passes too; else the usual length.
         """
         self.is_spent = True
         low, high = length_range(self._cloud)
         both: dict[float, float] = {}  # length -> what is lost there or at the next above
         for share, most in self._ladder():
             length = min(max(_two_digits(share * self._usual), low), high)
+            if any(trial.loses_limbs and trial.length < length for trial in self.tried):
+                continue
             trial = self.try_length(length, most)
             if trial is None or not trial.passed:
                 continue
@@ -200,6 +208,12 @@ class Advice:
         if both:
             return min(both, key=lambda length: both[length])
         passing = [trial.length for trial in self.tried if trial.passed]
+        if passing:
+            below = self.next_below(passing[0])
+            self._count_at(below, A_FEW)
+            trial = self.try_length(below, A_FEW)
+            if trial is not None and trial.passed and passing[0] <= NEARLY_NEXT * below:
+                return below
         followed = [one for one in passing if any(one < other <= NEARLY_NEXT * one for other in passing)]
         return min(followed or passing, key=self._far_from_usual, default=self._usual)
 
