@@ -153,6 +153,36 @@ def test_a_handle_of_three_members_is_not() -> None:
     assert not samples_of(handle(3.3)).rings
 
 
+def dumbbell(girth: float) -> np.ndarray:
+    """Two balls of radius 2.5, 11 apart, joined by a neck of a girth; the member is 1."""
+    x = np.linspace(-2.5, 13.5, 4000)
+    radius = np.sqrt(np.maximum(2.5**2 - np.minimum(x**2, (x - 11.0) ** 2), 0.0))
+    neck = np.where((x > 0.0) & (x < 11.0), girth / (2 * np.pi), 0.0)
+    blend = np.maximum(0.6 - np.abs(radius - neck), 0) ** 2 / 2.4
+    return turned(np.where(neck > 0.0, np.maximum(radius, neck) + blend, radius), x, 30.0, 0)
+
+
+def test_a_neck_that_joins_two_bodies_stays_down_to_two_and_a_half_members() -> None:
+    """A handle as thin goes: what it joins hangs together without it."""
+    points = dumbbell(2.6)
+    assert not samples_of(points).rings
+    grid = st.grid_from_points(points, st.Settings(length=1.0, effort="quick"))
+    assert known(grid.certificate).pieces == 1 and known(grid.settings).limb_girth == st.Settings(length=1.0).limb_girth
+    assert len(samples_of(handle(2.6)).rings) == 2
+
+
+def test_bodies_that_a_neck_too_thin_joins_are_pieces_with_a_warning_at_the_smallest() -> None:
+    grid = st.grid_from_points(dumbbell(1.9), st.Settings(length=1.0, effort="quick"))
+    found = known(grid.certificate)
+    (warning,) = (each for each in found.warnings if each.kind == "apart")
+    assert found.pieces == 2 and warning.words.startswith("is in 2 pieces")
+    assert min(np.linalg.norm(np.subtract(known(warning.where), middle)) for middle in ([0, 0, 0], [11.0, 0, 0])) < 0.5
+    apart = np.concatenate([dumbbell(0.0)[:, [1, 0, 2]], body(1.9, 1.9) + [0.0, 20.0, 0.0]])  # a limb that joins none
+    grid = st.grid_from_points(apart, st.Settings(length=1.0, effort="quick", allow_missing=0.1))
+    assert known(grid.certificate).pieces == 3
+    assert "apart" not in {each.kind for each in known(grid.certificate).warnings}
+
+
 def test_sheets_strips_and_holes_are_no_limbs() -> None:
     """Nor is a scan that is thin everywhere, as there would be nothing left."""
     rng = np.random.default_rng(1)

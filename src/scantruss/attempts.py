@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeGuard
 
 from .boundary.find import find_boundary
 from .cells.make import settings_of_triangles
@@ -69,14 +69,17 @@ class Attempt:
         return sum(len(ridge.places) for ridge in ridges_away_from(self.faults, samples, settings))
 
     def advice(self, fault: ScanTrussError) -> str:
-        """Say with which settings a smoothed grid passes that only leaves out too much of the scan; nothing for any other."""
-        found = fault.grid.certificate if isinstance(fault, CertificateError) else None
-        if found is None or not self.settings.smooth_scale or {each.kind for each in found.faults} != {"cover"}:
+        """Say with which settings a grid passes that only leaves out too much: of the mean surface, or without thin limbs; else nothing."""
+        if not only_leaves_out(fault):
             return ""
-        return (
-            f"with --smooth-scale {self.settings.smooth_scale:g} --ridge-angle 0 --allow-missing"
-            f" {math.ceil(100.0 * found.missing) / 100.0:g} a grid of its mean surface passes"
-        )
+        found = fault.grid.certificate
+        allowing = f"--allow-missing {math.ceil(100.0 * found.missing) / 100.0:g}"
+        if self.settings.smooth_scale:
+            smooth = f"--smooth-scale {self.settings.smooth_scale:g} --ridge-angle 0"
+            return f"with {smooth} {allowing} a grid of its mean surface passes"
+        if self.settings.plain_body and found.missing <= FAR_MISSING * self.settings.allow_missing:
+            return f"with --plain-body {allowing} a grid without its thin limbs passes"
+        return ""
 
 
 def attempts(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:
@@ -125,6 +128,12 @@ def attempts(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:
             if size <= COARSEST_SAMPLES:
                 yield from _same_scan(settings.replace(box_size=size))
         yield from _same_scan(settings.replace(method="paper"))
+
+
+def only_leaves_out(fault: ScanTrussError) -> TypeGuard[CertificateError]:
+    """Whether a grid only leaves out too much of the scan."""
+    found = fault.grid.certificate if isinstance(fault, CertificateError) else None
+    return found is not None and {each.kind for each in found.faults} == {"cover"}
 
 
 def _has_more_outliers(cloud: PointCloud, settings: Settings) -> bool:

@@ -8,7 +8,7 @@ from time import perf_counter
 
 import numpy as np
 
-from .attempts import Attempt, AttemptLimit, attempts
+from .attempts import Attempt, AttemptLimit, attempts, only_leaves_out
 from .boundary.find import find_boundary
 from .candidates import advance_fronts, best_that_passes, improve_fronts
 from .cells.make import settings_of_triangles, with_cells
@@ -204,7 +204,7 @@ def first_that_passes(
     if not faults:
         raise FrontError("none of the attempts made gives a grid that passes")
     worst = next((fault for fault in faults if isinstance(fault, CertificateError)), faults[0])
-    if advice and isinstance(worst, FrontError):
+    if advice and isinstance(worst, FrontError) and not only_leaves_out(worst):
         raise type(worst)(f"{worst}; {advice}", worst.grid, worst.where)
     raise worst
 

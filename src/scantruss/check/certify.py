@@ -24,7 +24,7 @@ from .gaps import bridged_gaps
 from .irregular import count_irregular
 from .left_out import OTHER_PIECES, parts_left_out
 from .limits import ROUNDED_BY, limits_of, places_to_look_at, widened_limits
-from .sheets import faults_on_sheets, nodes_of_samples
+from .sheets import cut_apart, faults_on_sheets, nodes_of_samples
 
 if TYPE_CHECKING:
     from ..boundary.find import Boundary
@@ -79,7 +79,8 @@ def certify(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings: S
     faults += [fault for fault in (*too_far, *faults_on_sheets(grid, samples, nearest)) if fault.kind not in known]
     missed_at = place_of(samples.scan[_missed(grid, samples, found, length)] + samples.origin)
     rounded = _rounded(grid, samples, found, length)
-    warnings = (*poor, *bridged, *doubtful, *places_to_look_at(certificate, missed_at, rounded))
+    apart = cut_apart(grid, samples, found, length)
+    warnings = (*poor, *apart, *bridged, *doubtful, *places_to_look_at(certificate, missed_at, rounded))
     return replace(certificate, faults=tuple(faults), warnings=warnings, widened=widened_limits(settings))
 
 

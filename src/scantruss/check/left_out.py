@@ -70,7 +70,7 @@ def points_left_out(
     beyond_cut = _beyond_cut(samples, away, np.where(small & ~other, samples.piece[owner], -1), members)
     for kind, judged, more in (("limbs", LIMB, away[beyond_cut]), ("slits", SLIT, away[:0])):
         if len(which := np.union1d(np.flatnonzero((samples.judged == judged) & (distance > reach)), more)):
-            group = _near_each_other(samples.scan[which], LIMBS_APART * members[which])
+            group = points_together(samples.scan[which], LIMBS_APART * members[which])
             parts += _places(kind, which, group, samples, distance)
     if floor.any():
         parts.append(_part("floor", away[floor], samples, distance))
@@ -122,7 +122,7 @@ def _places(
     return [*parts, *([_part(kind, which[rest], samples, distance, placed=False)] if rest.any() else [])]
 
 
-def _near_each_other(points: np.ndarray, apart: np.ndarray) -> np.ndarray:
+def points_together(points: np.ndarray, apart: np.ndarray) -> np.ndarray:
     """Return a number for each of some points (K, 3): the same where gaps between them are small (K,)."""
     cell = float(apart.max())
     cells, number = np.unique(np.floor(points / cell).astype(np.int64), axis=0, return_inverse=True)

@@ -7,12 +7,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..grid.certificate import Fault, place_of
+from ..kernels.geometry.components import component_labels
 from ..kernels.mesh.sheets import first_disconnected, nearest_nodes
+from ..surface.chosen_samples import LIMB
 from ..surface.scratch import with_own_scratch
+from .left_out import LIMBS_APART, points_together
 
 if TYPE_CHECKING:
     from ..grid.grid import Grid
     from ..surface.samples import SurfaceSamples
+    from .distances import Distances
 
 COVER = 1.2  # distance from the nearest node on its sheet at which a part of the scan is left out [member lengths]
 LEFT_OUT = 0.2  # share of the sheets that a grid may leave out
@@ -42,6 +46,25 @@ def faults_on_sheets(grid: Grid, samples: SurfaceSamples, nearest: np.ndarray) -
         words = "is torn where the scan is whole, as at a handle thinner than its members"
         faults.append(Fault("torn", words, place_of(disconnected + grid.origin)))
     return faults
+
+
+def cut_apart(grid: Grid, samples: SurfaceSamples, found: Distances, length: float) -> list[Fault]:
+    """Return a warning where a limb that was cut off lies between pieces of the grid, which the scan has as one."""
+    node_piece = component_labels(len(grid.nodes), grid.edges[:, 0], grid.edges[:, 1])
+    piece, cut = node_piece[grid.triangles[:, 0]], np.flatnonzero(samples.judged == LIMB)
+    if not len(cut) or (piece == piece[0]).all():
+        return []
+    limb = points_together(samples.scan[cut], np.full(len(cut), LIMBS_APART * length))
+    near = found.scan[cut] < length
+    touched = np.unique(np.column_stack([limb[near], piece[found.triangle[cut[near]]]]), axis=0)
+    _, number, pieces = np.unique(touched[:, 0], return_inverse=True, return_counts=True)
+    joined = np.unique(touched[pieces[number] > 1, 1])
+    if not len(joined):
+        return []
+    sizes = np.bincount(piece)
+    smallest = joined[sizes[joined].argmin()]
+    words = f"is in {len(joined)} pieces: what joins them is too thin for the members and was cut off"
+    return [Fault("apart", words, place_of(grid.nodes[node_piece == smallest].mean(axis=0) + grid.origin))]
 
 
 def disconnected_place(grid: Grid, samples: SurfaceSamples, nearest: np.ndarray) -> np.ndarray | None:

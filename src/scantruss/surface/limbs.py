@@ -79,8 +79,7 @@ def cut_limbs(
     reach = 2.0 * max(surface.radius, spacing)
     nearest_places(points, boxes, surface.mean, reach, owner, 0, len(points))
     which = np.flatnonzero((owner >= 0) & suspect[owner])
-    boundary = suspect & (~suspect[surface.neighbors] & (surface.neighbors >= 0)).any(axis=1)
-    parts = _Parts.of(points[which], owner[which], spacing, girth, surface, boundary, given)
+    parts = _Parts.of(points[which], owner[which], spacing, girth, surface, _bodies_beside(suspect, surface), given)
     if parts is None:
         return none
     gone, rings = parts.cut()
@@ -102,6 +101,15 @@ def _suspects(surface: Surface, boxes: SearchBoxes, girth: float) -> np.ndarray:
     return marks
 
 
+def _bodies_beside(suspect: np.ndarray, surface: Surface) -> np.ndarray:
+    """Return at each suspect sample (S,) the number of the rest of the scan that it is linked to, -1 where it is linked to none."""
+    linked = (surface.neighbors >= 0) & ~suspect[surface.neighbors] & suspect[:, None]
+    body, at = _labels(suspect, surface.neighbors), np.flatnonzero(linked.any(axis=1))
+    beside = np.full(len(suspect), -1)
+    beside[at] = body[surface.neighbors[at, linked[at].argmax(axis=1)]]
+    return beside
+
+
 @dataclass(frozen=True, eq=False)
 class _Parts:
     """Fine samples of the parts of a scan where limbs may be, and what they are."""
@@ -115,6 +123,7 @@ class _Parts:
     label: np.ndarray  #: (S,) number of the part of each sample
     thin: np.ndarray  #: (S,) bool
     solid: np.ndarray  #: (S,) bool, of a part that is no end of a limb
+    body: np.ndarray  #: (S,) number of the rest of the scan that is linked to each, -1 where it is linked to none
 
     @classmethod
     def of(
@@ -124,10 +133,10 @@ class _Parts:
         spacing: float,
         limit: float,
         scan: Surface,
-        boundary: np.ndarray,
+        bodies: np.ndarray,
         given: GivenNormals | None,
     ) -> _Parts | None:
-        """Return the parts of points (N, 3) of samples of the scan (N,); None where none is thin."""
+        """Return the parts of points (N, 3) of samples of the scan (N,), beside its other parts (T,); None where none is thin."""
         length = scan.length
         radius = max(FINE_SAMPLES * length, 0.25 * spacing)
         found = link_samples(points, radius, length, spacing, given)
@@ -150,7 +159,8 @@ class _Parts:
         area = sample_areas(surface) / (length * surface.field) ** 2
         label = _labels(thin, surface.neighbors)
         total = np.bincount(label, area, len(label))
-        at_boundary = np.bincount(label, boundary[of_scan], len(label)) > 0
+        body = bodies[of_scan]
+        at_boundary = np.bincount(label, body >= 0, len(label)) > 0
         small = ~thin & ~at_boundary[label] & (total[label] < BLUNT_END)
         thin = thin | small
         label = _labels(thin, surface.neighbors)
@@ -159,9 +169,9 @@ class _Parts:
             thin = thin & ~few
             label = _labels(thin, surface.neighbors)
         total = np.bincount(label, area, len(label))
-        at_boundary = np.bincount(label, boundary[of_scan], len(label)) > 0
+        at_boundary = np.bincount(label, body >= 0, len(label)) > 0
         solid = ~thin & (at_boundary | (total >= LEAST_TRIANGLES * TRIANGLE_AREA))[label]
-        return cls(points, found.owner, surface, axis, girth, limit, label, thin, solid)
+        return cls(points, found.owner, surface, axis, girth, limit, label, thin, solid, body)
 
     def cut(self) -> tuple[np.ndarray, tuple[LimbRing, ...]]:
         """Return which points (N,) bool are cut off, and the rings."""
@@ -189,16 +199,29 @@ class _Parts:
         return removed, tuple(rings)
 
     def _kept_necks(self, thin: np.ndarray, fat: np.ndarray) -> np.ndarray:
-        """Return the labels of thin parts that stay: those before a blunt end that are not much too thin; all links thin-fat (L,)."""
+        """Return the labels of thin parts that stay, of all links thin-fat (L,).
+
+        They are not much too thin, and lie before a blunt end or join what would fall apart without them.
+        """
         kept = []
         solid = np.unique(self.label[self.solid])
         for part in np.unique(thin):
             ends = np.unique(fat[thin == part])
             blunt = ~np.isin(ends, solid)
-            thick = self._thinnest(self.label == part) >= NECK_GIRTH * self.limit
-            if len(ends) > 1 and blunt.any() and not blunt.all() and thick:
-                kept.append(part)
+            if len(ends) < 2 or self._thinnest(self.label == part) < NECK_GIRTH * self.limit:
+                continue
+            if blunt.all() or (not blunt.any() and not self._joins(part, ends, thin, fat)):
+                continue
+            kept.append(part)
         return np.array(kept, np.int64)
+
+    def _joins(self, part: int, ends: np.ndarray, thin: np.ndarray, fat: np.ndarray) -> bool:
+        """Whether the ends (K,) of a thin part hang together by that part alone, of all links thin-fat (L,)."""
+        others, to_body = thin != part, self.body >= 0
+        one = np.concatenate([thin[others], self.label[to_body]])
+        other = np.concatenate([fat[others], len(self.label) + self.body[to_body]])
+        apart = component_labels(len(self.label) + int(self.body.max()) + 1, one, other)
+        return len(np.unique(apart[ends])) > 1
 
     def _thinnest(self, which: np.ndarray) -> float:
         """Return the girth at the thinnest twentieth of some samples (S,) bool [desired lengths]."""
