@@ -6,11 +6,12 @@ import numpy as np
 
 from ..kernels.surface.local_surface import Surface
 from ..scan.vectors import dots
-from ..surface.limbs import POINTS_OF_RING, SMALLEST_RING
+from ..surface.limbs import POINTS_OF_RING
 from .curves import length_around, normals_along, resample, smooth_turns
 
 STEEP_END = 0.5  # largest mean cosine between the scan's normals along a curve and the axis of a tube that ends there
 SMOOTHINGS_OF_END = 8  # passes in which the zigzag of the end is halved
+SMALLEST_END = 2.0  # length of an end below which the front runs over it as over a hole [desired lengths]
 
 
 def end_of_tube(surface: Surface, curve: np.ndarray) -> np.ndarray | None:
@@ -30,4 +31,4 @@ def end_of_tube(surface: Surface, curve: np.ndarray) -> np.ndarray | None:
     steep = abs(float((normals @ axis).mean())) < STEEP_END
     outwards = float(dots(arms, normals).mean()) > 0.0
     desired = surface.length * float(surface.field[((surface.mean - ring[0]) ** 2).sum(axis=1).argmin()])
-    return ring if steep and outwards and length_around(ring) > SMALLEST_RING * desired else None
+    return ring if steep and outwards and length_around(ring) > SMALLEST_END * desired else None

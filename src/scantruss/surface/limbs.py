@@ -36,7 +36,7 @@ NEAR_PLANE = 0.3  # distance from the plane of a ring up to which points tell it
 RING_WAVES = 3  # of a ring: its radius is a Fourier series of so many terms
 WIDEST_GAP = 100.0  # largest angle without points, seen from the middle of a ring [degree]
 SMALLEST_RING = (
-    2.0  # girth of a ring below which it is no boundary but a hole that the front runs over [desired lengths]
+    2.5  # girth of a ring below which it is no boundary but a hole that the front runs over [desired lengths]
 )
 POINTS_OF_RING = 72
 MOST_OF_SCAN_THIN = 0.4  # share of the scan above which what is thin is the scan itself
