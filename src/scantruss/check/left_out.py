@@ -185,6 +185,7 @@ def _first_and_more(parts: list[LeftOut]) -> list[LeftOut]:
 
 
 def _hole(places: np.ndarray, samples: SurfaceSamples, *, asked: bool) -> LeftOut:
-    """Return a hole of places (K, 3) in it or around it as an entry."""
+    """Return a hole as an entry, by places (K, 3): samples that fill it (asked), or the curve around it."""
     where, size = place_of(places.mean(axis=0) + samples.origin), float(np.ptp(places, axis=0).max())
+    size += 2.0 * samples.surface.radius if asked else 0.0  # samples end before the points around
     return LeftOut("hole", 0, 0.0, where, size, asked=asked)
