@@ -79,8 +79,8 @@ SCANS = (
 WEAKEST = (
     "The vase gets members of a seventh of its height, because no shorter length that `info` tries passes. Lip and handle are"
     " rounded off, as they lie within half a member of the grid.",
-    "The figure with thin limbs passes because slits are filled and arms cut off, which is said: its feet grow into one. With members"
-    " a third shorter it keeps both feet and its ears.",
+    "The figure with thin limbs passes because slits are filled and hands cut off, which is said: its feet grow into one. With members"
+    " of 0.0394 it keeps them apart.",
     "The range scans of the bunny have rims with notches and bridged gaps, where the scanner saw little; a front paw is a piece by"
     " itself, or left out.",
 )
