@@ -77,7 +77,12 @@ def attempts(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:
     Rather a grid without ridges than none, or one of the mean surface of a rough scan, or of another look at it: a scan so rough
     that hardly a grid passes is another one to samples that lie a little farther apart. Method "paper" comes last.
     """
-    yield from _same_scan(settings)
+    first, *others = _same_scan(settings)
+    yield first
+    hall = settings.keep_rods and settings.method == "default" and _is_hall(cloud, settings)
+    if hall:  # no other front would get around its columns
+        yield from _same_scan(settings.replace(keep_rods=False))
+    yield from others
     samples = sample_surface(cloud, settings)
     rough, cut = samples.rough, len(samples.rings) > 0
     if cut:  # fewer limbs cut off, then none
@@ -91,7 +96,7 @@ def attempts(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:
             yield from _same_scan(settings)
         elif not settings.plain_body and not settings.sharp_edges and _is_body(cloud, settings):
             yield from _same_scan(settings.replace(plain_body=True))
-    if settings.keep_rods and settings.method == "default" and _has_rods(cloud, settings):
+    if settings.keep_rods and settings.method == "default" and not hall and _has_rods(cloud, settings):
         settings = settings.replace(keep_rods=False)
         yield from _same_scan(settings)
     samples = sample_surface(cloud, settings)
@@ -139,11 +144,17 @@ def _is_body(cloud: PointCloud, settings: Settings) -> bool:
 def _has_rods(cloud: PointCloud, settings: Settings) -> bool:
     """Whether a part of the scan is too thin for a grid, as columns and scaffold are.
 
-    Where limbs can be cut off, such parts are limbs too, and count as missing, unless the scan falls apart without them, as a hall does.
+    Where limbs can be cut off, such parts are limbs too, and count as missing.
     """
+    without = sample_surface(cloud, settings.replace(keep_rods=False))
+    return bool((without.judged == ROD).any()) and not sample_surface(cloud, settings).rings
+
+
+def _is_hall(cloud: PointCloud, settings: Settings) -> bool:
+    """Whether the scan falls apart without such parts, as a hall does into its roof and its floor."""
     cut, without = sample_surface(cloud, settings), sample_surface(cloud, settings.replace(keep_rods=False))
     parts = [len(each.pieces) + len(each.not_chosen) for each in (cut, without)]
-    return bool((without.judged == ROD).any()) and (not cut.rings or parts[1] > parts[0])
+    return bool((without.judged == ROD).any()) and parts[1] > parts[0]
 
 
 def _smoothed(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:

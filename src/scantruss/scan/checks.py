@@ -252,8 +252,8 @@ def single_precision_note(cloud: PointCloud) -> tuple[str, ...]:
         return ()
     names, unit = " and ".join("xyz"[axis] for axis in coarse), f" {cloud.unit}" if cloud.unit else ""
     return (
-        f"{names} {'are' if len(coarse) > 1 else 'is'} in steps of up to {step[coarse].max():.2g}{unit}, rounded to single precision (float32)"
-        " far from zero: export the scan again in double precision, or moved near zero",
+        f"{names} {'are' if len(coarse) > 1 else 'is'} in steps of up to {step[coarse].max():.2g}{unit}, rounded to single precision"
+        " (float32) far from zero: export the scan again in double precision, or moved near zero",
     )
 
 
