@@ -65,6 +65,23 @@ def test_buckling_and_frequencies_come_where_they_are_asked_for(
     assert "buckling factors of ULS" in said and "natural frequencies" in said
 
 
+def test_it_is_said_where_buckling_makes_the_sections_larger(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Else the utilization of what was sized is far below 1 for no reason that a reader sees."""
+    assert (
+        run(
+            "structure grid.json out.json --scale 50 --supports boundary --loads self,snow:3kN/m2 --size 1 --report r.json"
+        )
+        == 0
+    )
+    rounds = json.loads(Path("r.json").read_text())["sizing_rounds"]
+    passed = [each for each in rounds if each["buckling"] is not None]
+    assert len(passed) > 1 and passed[0]["buckling"] < 10 <= passed[-1]["buckling"]
+    said = capsys.readouterr().out
+    assert f"all members pass at {passed[0]['mass']:,.0f} kg, but there the structure buckles at" in said
+    (line,) = (line for line in said.splitlines() if line.startswith("all members pass"))
+    assert line.endswith(f"larger sections raise that to {passed[-1]['buckling']:.3g}")
+
+
 def test_a_path_is_reported_drawn_and_announced(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = "structure grid.json out.json --scale 50 --loads self,snow:1kN/m2 --path worst --path-steps 3 --imperfection mode:20mm"
     assert run(f"{words} --dry-run") == 0
