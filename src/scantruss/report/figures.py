@@ -221,7 +221,7 @@ def certificate_rows(certificate: Certificate) -> list[tuple[str, str, str]]:
 
 def cloud_lines(cloud: PointCloud) -> list[str]:
     """Return points, extent, spacing, unit and the range of member lengths, in words."""
-    from ..scan.member_length import length_range
+    from ..scan.member_length import denser_words, length_range
 
     low, high = length_range(cloud)
     unit = f" {cloud.unit}" if cloud.unit else ""
@@ -237,7 +237,7 @@ def cloud_lines(cloud: PointCloud) -> list[str]:
     if low > high:
         lines.append(
             f"no length fits: the points need members of at least {low:g}{unit}, and the scan is too small for more than {high:g}"
-            "; scan it more densely"
+            f"; {denser_words(cloud)}"
         )
     else:
         lines.append(f"length   {low:g} to {high:g}{unit}")
