@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..boundary.polylines import POINTS_UNDER_LINE, corners_of_polyline, divide_polyline, feet_on_scan, simplify
-from ..errors import InputError, unit_words
+from ..errors import InputError, unit_words, words_of_number
 from ..kernels.surface.local_surface import Surface
 from ..surface.samples import SurfaceSamples, distance_from_scan, narrow_surface
 
@@ -60,7 +60,7 @@ def _check_on_scan(
         distance = distance_from_scan(samples.surface, place)
         if distance > 0.5 * length:
             raise InputError(
-                f"fixed line {number}, point {k + 1} {_text(line[k])} is {distance:.4g}{unit} away from the scan;"
+                f"fixed line {number}, point {k + 1} {_text(line[k])} is {words_of_number(distance, 4)}{unit} away from the scan;"
                 f" it must lie within half a member, {0.5 * length:.4g}{unit}"
             )
 
@@ -72,7 +72,7 @@ def _check_length(given: np.ndarray, closed: bool, number: int, unit: str, lengt
     if total < least:
         what = "ring, that is at least two members" if closed else "line, that is at least half a member"
         raise InputError(
-            f"fixed line {number} is {total:.4g}{unit_words(unit)} long; a {what}, {least:.4g}{unit_words(unit)}, is needed"
+            f"fixed line {number} is {words_of_number(total, 4)}{unit_words(unit)} long; a {what}, {least:.4g}{unit_words(unit)}, is needed"
         )
 
 
@@ -83,7 +83,7 @@ def _onto_scan(points: np.ndarray, number: int, samples: SurfaceSamples, surface
     if len(away):
         unit = unit_words(samples.unit)
         raise InputError(
-            f"fixed line {number} leaves the scan by {gaps[away[0]]:.4g}{unit} near"
+            f"fixed line {number} leaves the scan by {words_of_number(float(gaps[away[0]]), 4)}{unit} near"
             f" {_text(points[away[0]] + samples.origin)};"
             f" it must stay within half a member, {0.5 * length:.4g}{unit}: give it more points"
         )
