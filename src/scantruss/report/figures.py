@@ -72,8 +72,8 @@ def quality_rows(grid: Grid) -> list[tuple[str, str, str]]:
         ("length std / mean", "length_cv", "{:.4f}"),
         ("length / desired, mean", "stretch_mean", "{:.4f}"),
         ("the same, std / mean", "stretch_cv", "{:.4f}"),
-        ("smallest angle", "angle_min", "{:.1f}"),
-        ("largest angle", "angle_max", "{:.1f}"),
+        ("smallest angle [degree]", "angle_min", "{:.1f}"),
+        ("largest angle [degree]", "angle_max", "{:.1f}"),
         ("nodes of six members", "valence6", "{:.0%}"),
     )
     if grid.cells != "triangle":
