@@ -160,7 +160,7 @@ def test_what_does_not_work_is_refused_in_figures(change: dict[str, Any], words:
 
 def test_lengths_in_refusals_have_their_unit() -> None:
     grid = replace(GRIDS["dome"](), unit="mm")
-    refused = [
+    refused: list[tuple[dict[str, Any], str]] = [
         ({"member": 3.0, "node": 2.0}, r"a node .* members, so give at least 3 mm"),
         ({"clearance": 0.9}, r"clearance 0\.9 mm leaves .* couplings of \S+ mm; give at most \S+ mm or"),
         ({"bed": (20.0, 20.0, 20.0)}, r"needs \S+ x \S+ x \S+ mm and the bed is 20 x 20 x 20 mm;"),
