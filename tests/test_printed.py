@@ -250,7 +250,7 @@ def test_balls_take_their_rods_and_no_sockets_meet(name: str) -> None:
                 thick.transform(np.stack([x, np.cross(way, x), way, np.zeros(3)], axis=1)) ^ ball.body
             ).volume() > 0.1
     with pytest.raises(
-        st.InputError, match=r"sockets of N\d+ would meet in a ball of 6; it needs a --node-diameter of"
+        st.InputError, match=r"sockets of N\d+ would meet in a ball of 6 mm; it needs a --node-diameter of"
     ):
         build_nodes(grid, **SIZES)
 
