@@ -120,7 +120,7 @@ def test_the_grid_reaches_a_boundary_that_leaves_the_scan_by_less_than_half_a_me
     too_far = ring((-5.8, -5.2), (5.2, -5.2), (5.2, 5.2), (-5.8, 5.2))
     with pytest.raises(
         LengthError,
-        match=r"boundary 1 leaves the scan by up to 0\.\d+, near \(-5\.8, .*half a member, 0\.5: move it there, or give it more points",
+        match=r"boundary 1 leaves the scan by up to 0\.\d+, near \(-5\.8, .*half a member, 0\.5: move it, or add points",
     ):
         grid_from_points(plate(), Settings(length=1.0, boundary=(too_far,)))
 
