@@ -17,7 +17,8 @@ from scantruss import pipeline
 from scantruss.attempts import Attempt
 from scantruss.cli.main import main
 from scantruss.report.advice import LEAST_TRIED, MOST_TRIED, SURE_PER_SPACING, TRIED_AROUND, Advice, LengthTrial
-from scantruss.scan.member_length import length_range, round_length
+from scantruss.report.lengths import advice_rows
+from scantruss.scan.member_length import length_range, round_length, suggest_length
 from scantruss.surface.samples import SurfaceSamples
 
 
@@ -158,6 +159,38 @@ def test_the_length_nearby_is_the_nearest_that_passes_and_costs_no_more_than_twe
     made = counted_runs(monkeypatch, lambda length: False)
     assert Advice(cloud, st.Settings(length=1.0)).nearby(failing) is None
     assert sum(max(1.0, (failing / length) ** 2) for length in made) <= 20.0 and len(set(made)) >= 4
+
+
+def test_no_sag_is_given_of_a_member_longer_than_the_bend_is_wide(monkeypatch: pytest.MonkeyPatch) -> None:
+    cloud = cloud_of("limpet")
+    monkeypatch.setattr(Advice, "try_length", lambda *_, **__: None)
+    monkeypatch.setattr(Advice, "radius", lambda _: 0.5 * suggest_length(cloud))
+    head, rows = advice_rows(Advice(cloud, st.Settings(length=1.0)), suggest_length(cloud), cloud)
+    sags = {float(row[0]): row[head.index("sag L^2/8R [mm]" if cloud.unit else "sag L^2/8R")] for row in rows}
+    assert len(sags) > 2 and all((sag == "-") == (length > suggest_length(cloud)) for length, sag in sags.items())
+
+
+def test_a_length_far_too_short_costs_one_look_at_the_usual_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    """It was meant in another unit; grids near the shortest possible length have many members and take long."""
+    cloud = cloud_of("limpet")
+    made = counted_runs(monkeypatch, lambda length: True)
+    assert Advice(cloud, st.Settings(length=1.0)).nearby(0.01 * length_range(cloud)[0]) == suggest_length(cloud)
+    assert made == [suggest_length(cloud)]
+
+
+@pytest.mark.parametrize(
+    ("suffix", "words"), [(".obj", "divide its triangles first"), (".xyz", "scan it more densely")]
+)
+def test_a_mesh_of_few_vertices_is_refused_with_a_way_on(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], suffix: str, words: str
+) -> None:
+    corners = np.array([[x, y, z] for x in (0.0, 9.0) for y in (0.0, 8.0) for z in (0.0, 7.0)])
+    path, sign = tmp_path / f"box{suffix}", "v " if suffix == ".obj" else ""
+    path.write_text("\n".join(sign + " ".join(map(str, corner)) for corner in corners))
+    assert main(["info", str(path)]) == 0
+    assert words in capsys.readouterr().out
+    assert main(["grid", str(path), str(tmp_path / "grid.json"), "--length", "2"]) == 2
+    assert words in capsys.readouterr().err
 
 
 def test_a_suggestion_and_its_table_cost_no_more_than_so_many_grids_and_points(

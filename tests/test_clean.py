@@ -298,6 +298,15 @@ def test_the_command_counts_what_it_does_and_writes_normals(tmp_path: Path, caps
     assert np.loadtxt(out).shape == (figures["points"], 6)
 
 
+def test_how_far_points_moved_has_the_unit_of_the_scan() -> None:
+    points = make("cloth", 4000).points
+    said = {
+        unit: [step.words for step in clean_points(points, unit=unit).steps if step.name == "noise"]
+        for unit in ("mm", "")
+    }
+    assert said["mm"][0].endswith(" mm (rms)") and said["mm"][0].replace(" mm", "") == said[""][0]
+
+
 def test_the_command_refuses_before_it_reads(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     scan = tmp_path / "scan.xyz"
     np.savetxt(scan, make("scallop", 500).points)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -14,7 +16,7 @@ from typed import xyz
 from scantruss.check.distances import boxes_of, distances_to_grid
 from scantruss.kernels.geometry.triangles import distance_to_triangle
 from scantruss.kernels.mesh.coverage import nearest_distances
-from scantruss.kernels.mesh.distances import plane_distances
+from scantruss.kernels.mesh.distances import plane_distances, triangle_boxes
 
 pytestmark = pytest.mark.kernels
 
@@ -32,6 +34,19 @@ def test_the_nearest_of_all_triangles_is_found(seed: int, away: float) -> None:
     assert found == pytest.approx(slow, abs=1e-12 * (1 + away * length))
     at = distance_to_triangles(places, *(corners[nearest, k] for k in range(3)))
     assert at == pytest.approx(slow, abs=1e-12 * (1 + away * length))
+
+
+def test_a_node_far_away_takes_no_room_and_the_nearest_triangle_is_found() -> None:
+    """Its triangles are thousands of members long; entered in boxes of half a member they filled the memory."""
+    grid, length = dome(5), 4.0
+    nodes = grid.nodes.copy()
+    nodes[0] += [3e3 * length, 2e3 * length, 1e3 * length]
+    assert len(triangle_boxes(nodes, grid.triangles, 0.5 * length, 0.1 * length).triangle) <= 2000 * len(grid.triangles)
+    corners = nodes[grid.triangles]
+    places = np.concatenate([corners.mean(axis=1), np.random.default_rng(0).uniform(0.0, 1e3 * length, (20, 3))])
+    slow = distance_to_triangles(places[:, None], *(corners[None, :, k] for k in range(3))).min(axis=1)
+    found, _ = distances_to_grid(places, dataclasses.replace(grid, nodes=nodes), length)
+    assert found == pytest.approx(slow, abs=1e-8 * length)
 
 
 @settings(max_examples=20)

@@ -119,7 +119,8 @@ def test_the_grid_reaches_a_boundary_that_leaves_the_scan_by_less_than_half_a_me
     assert known(grid.certificate).passed and outside_points(grid) == 0
     too_far = ring((-5.8, -5.2), (5.2, -5.2), (5.2, 5.2), (-5.8, 5.2))
     with pytest.raises(
-        LengthError, match=r"boundary 1 leaves the scan by up to 0\.\d+, near \(-5\.8, .*half a member, 0\.5,"
+        LengthError,
+        match=r"boundary 1 leaves the scan by up to 0\.\d+, near \(-5\.8, .*half a member, 0\.5: move it, or add points",
     ):
         grid_from_points(plate(), Settings(length=1.0, boundary=(too_far,)))
 

@@ -50,3 +50,39 @@ def test_a_scan_that_is_no_raster_stays_whole(name: str) -> None:
     points = make(name, 5000).points.copy()
     points[:100, 2] = points[:, 2].min() - 50.0
     assert len(st.PointCloud.from_array(points).points) == len(points)
+
+
+@pytest.mark.parametrize("share", [0.02, 0.4])
+@pytest.mark.parametrize("place", [(-9999.0, -9999.0, -9999.0), (0.0, 0.0, 0.0)])
+def test_points_at_one_place_far_away_are_left_out_and_told(place: tuple[float, float, float], share: float) -> None:
+    """As an organized scan in national coordinates has them where no echo came back."""
+    points = make("cloth", 5000).points + [500_000.0, 4_500_000.0, 300.0]
+    at = np.random.default_rng(0).random(len(points)) < share
+    points[at] = place
+    cloud = st.PointCloud.from_array(points)
+    assert len(cloud.points) == (~at).sum()
+    assert cloud.left_out == (("at a place that stands for no data", at.sum()),)
+    said = f"{at.sum():,} points stand at ({place[0]:g}, {place[1]:g}, {place[2]:g})"
+    assert any(said in note for note in cloud.notes)
+
+
+def test_one_point_far_away_and_points_at_one_place_of_the_scan_stay() -> None:
+    points = make("cloth", 5000).points.copy()
+    points[:100] = points[100]
+    points[200] = 1e4
+    assert len(st.PointCloud.from_array(points).points) == len(points)
+
+
+def test_a_valley_floor_in_heights_of_whole_metres_stays() -> None:
+    points = terrain()
+    points[:, 2] = np.round(points[:, 2])
+    floor = points[:, 2] == points[:, 2].min()
+    assert floor.mean() > 0.002
+    assert len(st.PointCloud.from_array(points).points) == len(points)
+
+
+@pytest.mark.filterwarnings("error")
+def test_a_raster_with_every_point_twice_gives_no_warning() -> None:
+    points = np.round(np.repeat(terrain(), 2, axis=0))
+    points[:, 2] = np.maximum(points[:, 2], 685.0)
+    assert len(st.PointCloud.from_array(points).points) == len(points)

@@ -1,5 +1,7 @@
 """The edge of the surface lies a little beyond the outermost points; how far, tells how unevenly these lie."""
 
+import re
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,6 +16,7 @@ from scantruss.boundary import offset as module
 from scantruss.boundary.corners import CURVE_STEP, find_corners
 from scantruss.boundary.curves import heights_along, outward, resample, room_across, runs_around
 from scantruss.boundary.offset import NO_BIAS, SamplingBias
+from scantruss.cli.main import main
 from scantruss.kernels.surface.local_surface import Surface
 from scantruss.surface.samples import sample_surface
 
@@ -222,3 +225,23 @@ def test_a_sparse_scan_of_a_round_shell_has_hardly_a_corner() -> None:
     """Ten points for a node: what turns there, turns by chance. Ten rims of fifty members had thirty."""
     corners = [len(loop.corners) for seed in range(10) for loop in boundary_of(disc(11.5, seed))[0].loops]
     assert sum(corners) <= 12
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_where_random_points_leave_the_corners_in_doubt_it_is_said_with_a_length_that_shows_them(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], seed: int
+) -> None:
+    """A square of 3,000 points: by members of three spacings it has three to seven corners; there is no doubt with many points."""
+    for count, doubt in ((3000, True), (60_000, False)):
+        np.save(
+            tmp_path / "a.npy", np.pad(np.random.default_rng(seed).uniform(0.0, 10.0, (count, 2)), ((0, 0), (0, 1)))
+        )
+        assert main(["info", str(tmp_path / "a.npy"), "--length", "0.62", "--unit", "m"]) == 0
+        found = re.search(
+            r"corners may be missed, and some may be none; longer members, from (\S+) m,", capsys.readouterr().err
+        )
+        assert (found is not None) == doubt
+        if found is not None:
+            assert 0.62 < float(found[1]) < 1.3
+            assert main(["info", str(tmp_path / "a.npy"), "--length", "1.3", "--unit", "m"]) == 0
+            assert "may be none" not in capsys.readouterr().err

@@ -227,6 +227,23 @@ def test_a_sparse_part_inside_a_sheet_is_no_stray(share: float) -> None:
     assert outliers.find_outliers(points, 3.0)[sparse].mean() <= 0.03
 
 
+@pytest.mark.parametrize("share", [0.04, 0.02])
+def test_a_sparse_half_of_a_roof_is_no_stray(share: float) -> None:
+    """The half far from the scanner has three free edges, yet it is no fringe."""
+    shape = make("cloth", 60_000)
+    points, sparse = with_sparse_part(shape.points, shape.points[:, 0] > 0.0, share)
+    assert outliers.find_outliers(points, 3.0)[sparse].mean() <= 0.05
+
+
+def test_a_sparse_fringe_along_an_edge_is_left_out() -> None:
+    """A few rows far apart beyond the edge of a dense plate."""
+    x, y = (axis.ravel() for axis in np.meshgrid(np.arange(0.0, 30.0, 0.1), np.arange(0.0, 30.0, 0.1)))
+    u, v = (axis.ravel() for axis in np.meshgrid(np.arange(0.0, 30.0, 0.6), 30.5 + 0.6 * np.arange(3)))
+    noise = np.random.default_rng(2).normal(0.0, 0.002, (len(x) + len(u), 1))
+    points = np.column_stack([np.concatenate([x, u]), np.concatenate([y, v]), noise])
+    assert outliers.find_outliers(points, 3.0)[len(x) :].mean() >= 0.9
+
+
 def test_a_sparse_wall_beside_a_dense_one_is_no_stray() -> None:
     """A vessel whose inner wall has a tenth of the points of the outer one, a little more than its own spacing away."""
     rng = np.random.default_rng(1)

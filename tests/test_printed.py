@@ -158,6 +158,19 @@ def test_what_does_not_work_is_refused_in_figures(change: dict[str, Any], words:
         parts_of("dome", **change)
 
 
+def test_lengths_in_refusals_have_their_unit() -> None:
+    grid = replace(GRIDS["dome"](), unit="mm")
+    refused: list[tuple[dict[str, Any], str]] = [
+        ({"member": 3.0, "node": 2.0}, r"a node .* members, so give at least 3 mm"),
+        ({"clearance": 0.9}, r"clearance 0\.9 mm leaves .* couplings of \S+ mm; give at most \S+ mm or"),
+        ({"bed": (20.0, 20.0, 20.0)}, r"needs \S+ x \S+ x \S+ mm and the bed is 20 x 20 x 20 mm;"),
+        ({"node": 14.0}, r"has \S+ mm from its middle .* needs \S+ mm; give"),
+    ]
+    for change, words in refused:
+        with pytest.raises(st.InputError, match=words):
+            build_parts(grid, **(SIZES | {"bed": BED} | change))
+
+
 def test_parts_that_overlap_are_refused() -> None:
     one, two, *_ = parts_of("dome")
     check_apart([one, two])
@@ -237,7 +250,7 @@ def test_balls_take_their_rods_and_no_sockets_meet(name: str) -> None:
                 thick.transform(np.stack([x, np.cross(way, x), way, np.zeros(3)], axis=1)) ^ ball.body
             ).volume() > 0.1
     with pytest.raises(
-        st.InputError, match=r"sockets of N\d+ would meet in a ball of 6; it needs a --node-diameter of"
+        st.InputError, match=r"sockets of N\d+ would meet in a ball of 6 mm; it needs a --node-diameter of"
     ):
         build_nodes(grid, **SIZES)
 

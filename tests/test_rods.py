@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 from typed import known
 
 import scantruss as st
+from scantruss.attempts import attempts
 from scantruss.check.distances import boxes_of
 from scantruss.cli.main import main
 from scantruss.cli.shared import box_around
@@ -79,6 +81,16 @@ def test_a_hall_gets_grids_of_roof_and_floor_and_the_columns_are_told(hall: tupl
     (part,) = (part for part in known(grid.certificate).left_out if part.kind == "rods")
     assert 0.8 * column.sum() < part.points < 1.1 * column.sum() and not part.asked
     assert any(warning.kind == "left out" for warning in known(grid.certificate).warnings)
+
+
+def test_a_hall_is_tried_without_its_columns_right_after_the_first_grid(hall: tuple[np.ndarray, np.ndarray]) -> None:
+    """So that `info` finds its lengths with the few grids that it makes of each."""
+    cloud = st.PointCloud.from_array(hall[0])
+    first, second = islice(attempts(cloud, st.Settings(length=LENGTH, effort="quick")), 2)
+    assert first.settings.keep_rods and not second.settings.keep_rods
+    roof_alone = cloud.points[hall[0][:, 2] > 4.5]
+    all_of_it = list(attempts(st.PointCloud.from_array(roof_alone), st.Settings(length=LENGTH, effort="quick")))
+    assert all(attempt.settings.keep_rods for attempt in all_of_it)
 
 
 @pytest.mark.parametrize(("piece", "height"), [("2", (2.0, 6.5)), ("largest", (-0.2, 0.6)), ("1", (-0.2, 0.6))])

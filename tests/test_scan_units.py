@@ -319,3 +319,17 @@ def test_what_looks_like_degrees_is_said_where_nothing_tells(tmp_path: Path, suf
 def test_small_scans_do_not_look_like_degrees(tmp_path: Path, sides: tuple[float, float, float]) -> None:
     np.save(tmp_path / "a.npy", np.random.default_rng(2).random((400, 3)) * sides)
     assert read_points(tmp_path / "a.npy").notes == ()
+
+
+def test_coordinates_that_single_precision_has_rounded_are_told(tmp_path: Path) -> None:
+    """In steps of 0.5 at 4,500,000, where points are 0.1 apart; not where they are doubles, near zero, or 50 apart."""
+    plan = np.random.default_rng(2).random((4000, 3)) * [6.0, 6.0, 0.5]
+    np.save(tmp_path / "a.npy", plan + [500_000.0, 4_500_000.0, 300.0])
+    assert read_points(tmp_path / "a.npy").notes == ()
+    np.save(tmp_path / "a.npy", plan.astype(np.float32))
+    assert read_points(tmp_path / "a.npy").notes == ()
+    np.save(tmp_path / "a.npy", (500.0 * plan + [500_000.0, 4_500_000.0, 300.0]).astype(np.float32))
+    assert read_points(tmp_path / "a.npy").notes == ()
+    np.save(tmp_path / "a.npy", (plan + [500_000.0, 4_500_000.0, 300.0]).astype(np.float32))
+    (note,) = read_points(tmp_path / "a.npy", unit="m").notes
+    assert note.startswith("x and y are in steps of up to 0.5 m, rounded to single precision")

@@ -275,6 +275,10 @@ def test_what_cannot_be_built_is_warned_of_with_its_place() -> None:
     over = found(fan(1000.0), ball=100.0)["members overlap outside the ball"]
     assert len(over) == 6 + 12 and over[0][2:4] == (100.0, pytest.approx(60 * 3**0.5))
     assert len(found(fan(1000.0), ball=1000.0)["balls leave no member"]) == 12
+    [most] = found(fan(1000.0), ball=600.0)["balls take most of the members"]
+    assert most[2:4] == (pytest.approx(60.0), 50.0) and "balls take most of the members" not in found(
+        fan(1000.0), ball=400.0
+    )
     below = fan(1000.0).nodes + [0, 0, 100.0]
     two = make_grid([*fan(1000.0).nodes, *below], [*fan().triangles, *(fan().triangles + 7)])
     touching = found(two)["balls touch"]
@@ -505,4 +509,4 @@ def test_the_page_explains_every_table_column_option_and_warning() -> None:
         assert f"`{spec.name}`" in page
     source = (root / "src" / "scantruss" / "schedules" / "clashes.py").read_text(encoding="utf-8")
     kinds = re.findall(r'"([a-z][a-z ?:]{9,})"', source)
-    assert len(kinds) == 12 and all(f"| {kind} |" in page for kind in kinds), kinds
+    assert len(kinds) == 13 and all(f"| {kind} |" in page for kind in kinds), kinds

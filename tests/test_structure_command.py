@@ -1,5 +1,6 @@
 """``scantruss structure``: files, the report, and what is refused."""
 
+import dataclasses
 import json
 from pathlib import Path
 from typing import Any
@@ -63,6 +64,44 @@ def test_buckling_and_frequencies_come_where_they_are_asked_for(
     assert np.shape(json.loads(Path("out.json").read_text())["buckling_modes"]) == (3, 49, 3)
     said = capsys.readouterr().out
     assert "buckling factors of ULS" in said and "natural frequencies" in said
+
+
+@pytest.mark.parametrize(
+    ("turned", "words"),
+    [([0, 1, 2], None), ([0, 2, 1], "the surface faces y and"), ([2, 0, 1], "the surface faces x and")],
+)
+def test_a_roof_on_its_side_is_warned_of(
+    place: Path, capsys: pytest.CaptureFixture[str], turned: list[int], words: str | None
+) -> None:
+    """Snow on a scan with y up would load it from the side, and the figures look harmless."""
+    grid = st.read_grid("grid.json")
+    st.write(
+        dataclasses.replace(grid, nodes=np.ascontiguousarray(grid.nodes[:, turned]), origin=grid.origin[turned]),
+        "turned.json",
+    )
+    assert run("structure turned.json out.json --scale 50 --supports boundary --loads self,snow:1kN/m2") == 0
+    assert (
+        (words or "the surface faces") in capsys.readouterr().out
+        if words
+        else "the surface faces" not in capsys.readouterr().out
+    )
+
+
+def test_it_is_said_where_buckling_makes_the_sections_larger(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Else the utilization of what was sized is far below 1 for no reason that a reader sees."""
+    assert (
+        run(
+            "structure grid.json out.json --scale 50 --supports boundary --loads self,snow:3kN/m2 --size 1 --report r.json"
+        )
+        == 0
+    )
+    rounds = json.loads(Path("r.json").read_text())["sizing_rounds"]
+    passed = [each for each in rounds if each["buckling"] is not None]
+    assert len(passed) > 1 and passed[0]["buckling"] < 10 <= passed[-1]["buckling"]
+    said = capsys.readouterr().out
+    assert f"all members pass at {passed[0]['mass']:,.0f} kg, but there the structure buckles at" in said
+    (line,) = (line for line in said.splitlines() if line.startswith("all members pass"))
+    assert line.endswith(f"larger sections raise that to {passed[-1]['buckling']:.3g}")
 
 
 def test_a_path_is_reported_drawn_and_announced(place: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -60,6 +60,24 @@ def test_a_sign_between_thousands_does_not_make_other_points(line: str, german: 
         read("\n".join(lines))
 
 
+@pytest.mark.parametrize("number", [False, True])
+@pytest.mark.parametrize("header", ["", "X,Y,Z\n"])
+def test_commas_as_decimal_signs_and_as_separators_are_refused(number: bool, header: str) -> None:
+    """Read as whole numbers 9,147,5,774,7,044 would be the point 9, 147, 5."""
+    points = np.random.default_rng(0).uniform(-20.0, 20.0, (300, 3))
+    rows = [",".join(f"{value:.3f}".replace(".", ",") for value in point) for point in points]
+    rows = [f"{i + 1},{row}" for i, row in enumerate(rows)] if number else rows
+    with pytest.raises(FormatError, match="commas are decimal signs and separate the numbers too"):
+        read(header + "\n".join(rows))
+
+
+def test_whole_numbers_between_commas_are_read() -> None:
+    """Millimetres with colours of which one channel is written with zeros before it."""
+    points = np.random.default_rng(0).integers(-20_000, 20_000, (300, 3))
+    rows = "\n".join(f"{x},{y},{z},{abs(x) % 256},{abs(y) % 256},{abs(z) % 256:03}" for x, y, z in points)
+    assert np.array_equal(read(rows), points)
+
+
 @given(
     separator=st.sampled_from(sorted(SEPARATORS)),
     comma=st.booleans(),

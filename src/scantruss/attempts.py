@@ -89,7 +89,11 @@ def attempts(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:
     that hardly a grid passes is another one to samples that lie a little farther apart. Method "paper" comes last.
     """
     first, again, *others = _same_scan(settings)
-    yield from (first, again)
+    yield first
+    hall = settings.keep_rods and settings.method == "default" and _is_hall(cloud, settings)
+    if hall:  # no other front would get around its columns
+        yield from _same_scan(settings.replace(keep_rods=False))
+    yield again
     looks = list(_other_looks(cloud, settings)) if settings.method == "default" else []
     yield from map(Attempt, looks)  # where edges, limbs or slits are in the way, other fronts seldom help
     yield from others
@@ -103,7 +107,7 @@ def attempts(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:
     for look in looks:
         yield from list(_same_scan(look))[1:]
         settings = look if look.sharp_edges else settings
-    if settings.keep_rods and settings.method == "default" and _has_rods(cloud, settings):
+    if settings.keep_rods and settings.method == "default" and not hall and _has_rods(cloud, settings):
         settings = settings.replace(keep_rods=False)
         yield from _same_scan(settings)
     samples = sample_surface(cloud, settings)
@@ -161,11 +165,17 @@ def _other_looks(cloud: PointCloud, settings: Settings) -> Iterator[Settings]:
 def _has_rods(cloud: PointCloud, settings: Settings) -> bool:
     """Whether a part of the scan is too thin for a grid, as columns and scaffold are.
 
-    Where limbs can be cut off, such parts are limbs too, and count as missing, unless the scan falls apart without them, as a hall does.
+    Where limbs can be cut off, such parts are limbs too, and count as missing.
     """
+    without = sample_surface(cloud, settings.replace(keep_rods=False))
+    return bool((without.judged == ROD).any()) and not sample_surface(cloud, settings).rings
+
+
+def _is_hall(cloud: PointCloud, settings: Settings) -> bool:
+    """Whether the scan falls apart without such parts, as a hall does into its roof and its floor."""
     cut, without = sample_surface(cloud, settings), sample_surface(cloud, settings.replace(keep_rods=False))
     parts = [len(each.pieces) + len(each.not_chosen) for each in (cut, without)]
-    return bool((without.judged == ROD).any()) and (not cut.rings or parts[1] > parts[0])
+    return bool((without.judged == ROD).any()) and parts[1] > parts[0]
 
 
 def _smoothed(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:

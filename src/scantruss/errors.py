@@ -65,6 +65,11 @@ def words_of_number(value: float, digits: int) -> str:
     return f"{float(short):.0f}" if "e+" in short and abs(value) < MOST_WRITTEN_OUT else short
 
 
+def unit_words(unit: str, power: int = 1) -> str:
+    """Return what follows a number with a unit: " m", " m³"; nothing where the unit is not known."""
+    return f" {unit}{'³' if power == 3 else ''}" if unit else ""
+
+
 class CertificateError(FrontError):
     """A grid has come out that fails its certificate."""
 

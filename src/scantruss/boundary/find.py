@@ -50,6 +50,7 @@ class Loop:
     desired: np.ndarray | None = None  #: (M,) desired length at each point, in lengths; None if it is the same for all
     line_at: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))  #: points of the curve where lines end
     cut: str = ""  #: close or open where a limb was cut off, as the settings say
+    beyond: float = 0.0  #: how far the edge of the surface lies beyond the outermost points on the mean [scan unit]
 
     @property
     def corners(self) -> np.ndarray:
@@ -323,7 +324,7 @@ def smooth_loop(curve: np.ndarray, piece: int, bias: SamplingBias, settings: Set
     in_lengths = length if field is None else float((_steps(smoothed) / _between(field)).sum())
     if (in_lengths if settings.fill_holes is None else length) < settings.bridged_boundary_length:
         return None
-    return Loop(smoothed, corner_at, False, length, piece, field)
+    return Loop(smoothed, corner_at, False, length, piece, field, beyond=bias.beyond)
 
 
 def field_along(surface: Surface, curve: np.ndarray) -> np.ndarray | None:

@@ -152,7 +152,7 @@ def _curve(
         place = words_of_place(points[int(gaps.argmax())] + samples.origin)
         raise LengthError(
             f"boundary {number} leaves the scan by up to {words_of_number(worst, 4)}{unit}, near ({place});"
-            f" it must stay within half a member, {words_of_number(BRIDGED_DISTANCE * length, 4)}{unit}, which the grid bridges"
+            f" it must stay within half a member, {words_of_number(BRIDGED_DISTANCE * length, 4)}{unit}: move it, or add points"
         )
     return points, _apart(points, corners_of_polyline(points, vertices, True, settings), CORNERS_APART * length)
 

@@ -95,6 +95,16 @@ def offset_curve(
     return smoothed, corner_at
 
 
+def length_that_shows_corners(beyond: float, length: float) -> float:
+    """Return the least member length with which corners are found at full resolution; both lengths [scan unit].
+
+    `beyond` is the sampling bias at `length`; with the disc it falls as the cube root of the length.
+    """
+    if beyond <= CORNERS_SHOW_TO * length:
+        return length
+    return (beyond * length ** (1 / 3) / CORNERS_SHOW_TO) ** 0.75
+
+
 def _corners(
     curve: np.ndarray, bias: SamplingBias, settings: Settings, surface: Surface
 ) -> tuple[np.ndarray, np.ndarray]:

@@ -18,6 +18,7 @@ from .shared import (
     SCAN_HELP,
     add_memory,
     note_compiling,
+    note_corners,
     note_layers,
     note_outliers,
     note_pieces,
@@ -197,6 +198,7 @@ def grid_with_notes(
         bars.note(words_of_symmetry([row for row in made.symmetry if not isinstance(row, str)]))
     note_outliers(bars, cloud, made)
     note_layers(bars, cloud, made)
+    note_corners(bars, cloud, made)
     note_pieces(bars, cloud, made)
     return grid
 

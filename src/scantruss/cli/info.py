@@ -10,6 +10,7 @@ from .shared import (
     SCAN_HELP,
     add_memory,
     note_compiling,
+    note_corners,
     note_layers,
     note_outliers,
     read_scan,
@@ -67,6 +68,7 @@ def info(values: Namespace) -> None:
             samples, boundary = find_boundary(sample_surface(cloud, settings), settings, progress=bars)
         note_outliers(bars, cloud, settings, "scantruss grid")
         note_layers(bars, cloud, settings)
+        note_corners(bars, cloud, settings)
     print_lines(surface_lines(cloud, samples))
     field = samples.surface.field
     longest = f" to {words_of_number(settings.length * field.max(), 4)}" if settings.length_field else ""

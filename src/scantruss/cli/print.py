@@ -23,14 +23,20 @@ def print_parser() -> Parser:
     usage = "GRID|STRUCTURE OUT.3mf|OUT.stl --member-diameter D --node-diameter D [--scale S] [--marks] [--bed WxDxH] [--sockets]"
     said = (
         "Make watertight solids, members and nodes, for a 3D printer: one, or parts with plug joints that fit its bed, or balls\n"
-        "with sockets for rods."
+        "with sockets for rods. Lengths are those of the model, in the unit of the grid."
     )
     parser = Parser("print", usage, said)
     add_grid(
         parser, "grid or structure saved as .json by scantruss grid or structure; lengths of a structure are metres"
     )
     add_outs(parser, "model, .3mf or .stl", "?")
-    parser.add_argument("--member-diameter", metavar="D", type=number, required=True, help="diameter of the members")
+    parser.add_argument(
+        "--member-diameter",
+        metavar="D",
+        type=number,
+        required=True,
+        help="diameter of the members of the model",
+    )
     parser.add_argument("--node-diameter", metavar="D", type=number, required=True, help="diameter of the nodes")
     parser.add_argument(
         "--scale", metavar="S", type=scale, default=1.0, help="scale of the model, 0.01 or 1:100 (default 1)"

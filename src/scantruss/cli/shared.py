@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..errors import words_of_number
+from ..errors import unit_words, words_of_number
 
 if TYPE_CHECKING:
     import numpy as np
@@ -140,6 +140,25 @@ def note_layers(bars: Bars, cloud: PointCloud, settings: Settings) -> None:
         bars.note(
             f"the scan has two layers about {distance:.2g}{unit} apart on {share:.0%} of its surface, such as top and underside;"
             " the grid is one sheet between or on them: crop one layer away for a grid of the other"
+        )
+
+
+def note_corners(bars: Bars, cloud: PointCloud, settings: Settings) -> None:
+    """Report points so far apart along the boundary that its corners are doubtful, and the length that shows them."""
+    from ..boundary.find import find_boundary
+    from ..boundary.offset import length_that_shows_corners
+    from ..scan.member_length import round_length
+    from ..surface.samples import sample_surface
+
+    if settings.boundary:
+        return
+    _, boundary = find_boundary(sample_surface(cloud, settings), settings)
+    beyond = max((loop.beyond for loop in boundary.external), default=0.0)
+    length, unit = length_that_shows_corners(beyond, settings.length), unit_words(cloud.unit)
+    if length > settings.length:
+        bars.note(
+            f"the points are random and end {words_of_number(beyond, 2)}{unit} before the boundary on the mean, so corners may be missed,"
+            f" and some may be none; longer members, from {round_length(length, 'up'):g}{unit}, show them better, and --boundary gives them"
         )
 
 

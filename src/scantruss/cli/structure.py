@@ -47,7 +47,8 @@ OWN_OPTIONS = (  # name, metavar, help; the same names stand in a settings file
     ("held_layer", "outer|inner", "of a double layer: which one the supports hold (default outer, the grid)"),
     ("layer_edges", "tapered|closed", "of a double layer: how it ends at the boundary (default tapered of the dual, else closed)"),
     ("sharp_bends", "refuse|reduce", "of a double layer: what is done where the grid bends too sharply for its depth (default refuse)"),
-    ("size", "COUNT", "choose sections like --section until all members pass, at most so many different ones"),
+    ("size", "COUNT", "choose sections like --section until all members pass, and the structure buckles at 10 times its loads or more;"
+     " at most so many different ones"),
     ("size_by", "WAY", "members (default), groups (boundary, lines, inner, of each piece) or rings: those of one get the same section"),
     ("buckling", "COUNT", "linear buckling factors of the combination that buckles first (default 0)"),
     ("frequencies", "COUNT", "lowest natural frequencies (default 0)"),
@@ -114,6 +115,7 @@ def structure(values: Namespace) -> None:
         half_lines,
         mode_lines,
         report_structure,
+        sizing_lines,
         structure_lines,
         unlisted_lines,
     )
@@ -174,6 +176,7 @@ def structure(values: Namespace) -> None:
             f"{len(truss.nodes):,} nodes, {len(truss.members):,} members of {names} {truss.material.name},"
             f" {truss.lengths.mean():.3g} m long on average, {truss.mass:,.0f} kg without nodes",
             support_words(truss),
+            *sizing_lines(report),
             *mode_lines(report),
             *([] if buckling or path else ["the stability of the whole is not looked at; --buckling 1 does"]),
             *(f"warning: {words}" for words in report.warnings),

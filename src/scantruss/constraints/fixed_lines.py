@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..boundary.polylines import POINTS_UNDER_LINE, corners_of_polyline, divide_polyline, feet_on_scan, simplify
-from ..errors import InputError
+from ..errors import InputError, unit_words, words_of_number
 from ..kernels.surface.local_surface import Surface
 from ..surface.samples import SurfaceSamples, distance_from_scan, narrow_surface
 
@@ -47,10 +47,6 @@ def add_polylines(network: Network, samples: SurfaceSamples, settings: Settings)
             network.add(part, ring, own, name=name)
 
 
-def _unit(unit: str) -> str:
-    return f" {unit}" if unit else ""
-
-
 def _text(place: Sequence[float] | np.ndarray) -> str:
     return "(" + ", ".join(f"{c:.10g}" for c in place) + ")"
 
@@ -59,12 +55,12 @@ def _check_on_scan(
     given: np.ndarray, line: Sequence[Sequence[float]], number: int, samples: SurfaceSamples, length: float
 ) -> None:
     """Refuse a line with a point farther than half a member from the scan."""
-    unit = _unit(samples.unit)
+    unit = unit_words(samples.unit)
     for k, place in enumerate(given):
         distance = distance_from_scan(samples.surface, place)
         if distance > 0.5 * length:
             raise InputError(
-                f"fixed line {number}, point {k + 1} {_text(line[k])} is {distance:.4g}{unit} away from the scan;"
+                f"fixed line {number}, point {k + 1} {_text(line[k])} is {words_of_number(distance, 4)}{unit} away from the scan;"
                 f" it must lie within half a member, {0.5 * length:.4g}{unit}"
             )
 
@@ -76,7 +72,7 @@ def _check_length(given: np.ndarray, closed: bool, number: int, unit: str, lengt
     if total < least:
         what = "ring, that is at least two members" if closed else "line, that is at least half a member"
         raise InputError(
-            f"fixed line {number} is {total:.4g}{_unit(unit)} long; a {what}, {least:.4g}{_unit(unit)}, is needed"
+            f"fixed line {number} is {words_of_number(total, 4)}{unit_words(unit)} long; a {what}, {least:.4g}{unit_words(unit)}, is needed"
         )
 
 
@@ -85,9 +81,9 @@ def _onto_scan(points: np.ndarray, number: int, samples: SurfaceSamples, surface
     feet, gaps = feet_on_scan(points, surface)
     away = np.flatnonzero(gaps > 0.5 * length)
     if len(away):
-        unit = _unit(samples.unit)
+        unit = unit_words(samples.unit)
         raise InputError(
-            f"fixed line {number} leaves the scan by {gaps[away[0]]:.4g}{unit} near"
+            f"fixed line {number} leaves the scan by {words_of_number(float(gaps[away[0]]), 4)}{unit} near"
             f" {_text(points[away[0]] + samples.origin)};"
             f" it must stay within half a member, {0.5 * length:.4g}{unit}: give it more points"
         )

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, words_of_number
 from ..surface.samples import SurfaceSamples, distance_from_scan, local_field
 
 
@@ -30,7 +30,7 @@ def check_positions(
             points = samples.measured_points
             nearest = points[((points - place) ** 2).sum(axis=1).argmin()] + samples.origin
             raise InputError(
-                f"fixed position {place_text(places[k])} is {distance:.4g}{unit} away from the scan;"
+                f"fixed position {place_text(places[k])} is {words_of_number(distance, 4)}{unit} away from the scan;"
                 f" it must lie within half a member, {0.5 * local:.4g}{unit}; the nearest point is {place_text(nearest)}"
             )
         gaps = np.linalg.norm(relative[:k] - place, axis=1)

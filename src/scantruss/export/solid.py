@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, words_of_number
+from ..errors import InputError, unit_words, words_of_number
 from ..grid.certificate import check_passed
 from ..grid.grid import Grid
 from ..grid.marks import member_marks, node_marks
@@ -146,11 +146,11 @@ def check_diameters(grid: Grid, member_diameter: float, node_diameter: float, sc
         raise InputError(f"sides must be a whole number between 3 and 256, got {sides}")
     if len(grid.edges) == 0:
         raise InputError("the grid has no members, so there is nothing to print; give one with a triangle at least")
-    unit = f" {grid.unit}" if grid.unit else ""
+    unit = unit_words(grid.unit)
     if node_diameter < member_diameter:
         raise InputError(
             f"the node diameter {node_diameter:g}{unit} is smaller than the member diameter {member_diameter:g}{unit}; "
-            f"a node must cover the ends of its members, so give at least {member_diameter:g}"
+            f"a node must cover the ends of its members, so give at least {member_diameter:g}{unit}"
         )
     shortest = int(np.argmin(grid.lengths))
     length = float(grid.lengths[shortest]) * scale

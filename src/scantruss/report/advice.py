@@ -60,6 +60,7 @@ POINTS_LOOKED_AT = 2_000_000  # points that are looked at for that
 LEAST_TRIED = 5.0  # grids that are made for that even where the scan has more points
 TRIED_AROUND = 6.0  # grids that are made besides for the lengths of the table, one each
 TRIED_USUAL = 4.0  # grids that are made at the usual length where no length nearby passes and it is far away
+FAR_TOO_SHORT = 0.5  # share of the shortest possible length below which the usual one is looked at alone: that length is in another unit
 POINTS_PER_MEMBER = 9  # points that cost as much as a member of the grid
 MOST_MEMBERS = 60_000  # members of a grid that is made to try a length
 CLOSE_BEND = 0.95  # share of the scan that is less bent than the radius that is named
@@ -228,8 +229,13 @@ class Advice:
         return abs(float(np.log(length / self._usual)))
 
     def nearby(self, length: float) -> float | None:
-        """Return the nearest length that passes in place of one that does not, or the usual one; None where none of those tried does."""
+        """Return the nearest length that passes in place of one that does not, or the usual one; None where none of those tried does.
+
+        For a length far too short the usual one is tried alone.
+        """
         low, high = length_range(self._cloud)
+        if length < FAR_TOO_SHORT * low:
+            return self._usual_if_it_passes()
         at = min(max(length, low), high)
         lengths = {min(max(_two_digits(share * at), low), high) for share in (1.0, *NEARBY_LENGTHS)} - {length}
         if (sure := round_length(SURE_PER_SPACING * self._cloud.spacing, "up")) > length and sure < high:
@@ -241,10 +247,13 @@ class Advice:
                 if trial is not None and trial.passed:
                     return trial.length
         if not min(lengths, default=at) <= self._usual <= max(lengths, default=at):  # then this is cheap, or worth it
-            self._count_at(self._usual, TRIED_USUAL)
-            trial = self.try_length(self._usual, most=A_FEW)
-            return trial.length if trial is not None and trial.passed else None
+            return self._usual_if_it_passes()
         return None
+
+    def _usual_if_it_passes(self) -> float | None:
+        self._count_at(self._usual, TRIED_USUAL)
+        trial = self.try_length(self._usual, most=A_FEW)
+        return trial.length if trial is not None and trial.passed else None
 
     def next_above(self, length: float) -> float:
         """Return the next longer length to look at."""

@@ -72,8 +72,8 @@ def quality_rows(grid: Grid) -> list[tuple[str, str, str]]:
         ("length std / mean", "length_cv", "{:.4f}"),
         ("length / desired, mean", "stretch_mean", "{:.4f}"),
         ("the same, std / mean", "stretch_cv", "{:.4f}"),
-        ("smallest angle", "angle_min", "{:.1f}"),
-        ("largest angle", "angle_max", "{:.1f}"),
+        ("smallest angle [degree]", "angle_min", "{:.1f}"),
+        ("largest angle [degree]", "angle_max", "{:.1f}"),
         ("nodes of six members", "valence6", "{:.0%}"),
     )
     if grid.cells != "triangle":
@@ -221,7 +221,7 @@ def certificate_rows(certificate: Certificate) -> list[tuple[str, str, str]]:
 
 def cloud_lines(cloud: PointCloud) -> list[str]:
     """Return points, extent, spacing, unit and the range of member lengths, in words."""
-    from ..scan.member_length import length_range
+    from ..scan.member_length import denser_words, length_range
 
     low, high = length_range(cloud)
     unit = f" {cloud.unit}" if cloud.unit else ""
@@ -237,7 +237,7 @@ def cloud_lines(cloud: PointCloud) -> list[str]:
     if low > high:
         lines.append(
             f"no length fits: the points need members of at least {low:g}{unit}, and the scan is too small for more than {high:g}"
-            "; scan it more densely"
+            f"; {denser_words(cloud)}"
         )
     else:
         lines.append(f"length   {low:g} to {high:g}{unit}")

@@ -29,7 +29,7 @@ def advice_rows(advice: Advice, length: float, cloud: PointCloud) -> tuple[tuple
             (
                 f"{each:g}",
                 f"{members:,}",
-                f"{each**2 / (8.0 * radius):.2g}",
+                f"{each**2 / (8.0 * radius):.2g}" if each <= 2.0 * radius else "-",
                 f"{each / cloud.spacing:.3g}",
                 result_of(trial),
             )

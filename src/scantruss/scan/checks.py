@@ -26,6 +26,10 @@ NO_DATA_SHARES, FEWEST_NO_DATA = (0.002, 0.5), 20  # share and number of points 
 CLIFF_GAP = 0.1  # gap to the other heights, as a share of their range, that no terrain has
 STEEP_CLIFF = 10.0  # slope to the nearest others, in multiples of the usual one, that no shore has
 SOME_OF_RASTER = 20_000  # points of the rest that are looked at
+FAR_FROM_MIDDLE = (
+    10.0  # widths of the middle half of a scan from its middle, beyond which a place that many points share has no data
+)
+SINGLE_STEP = 0.25  # step of coordinates in single precision, in mean distances between points, from which it is told
 MOST_INVALID_SHARE = 0.01  # share of the points that may be invalid; more are a fault of the file
 EXTENTS_READ = (1e-30, 1e30)  # of a scan in any unit; numbers with swapped bytes lie outside
 CAUSE = "the file is damaged, its byte order wrong, or it has no-data values"
@@ -128,6 +132,37 @@ def find_invalid(points: np.ndarray, lower: np.ndarray, upper: np.ndarray, said:
     return invalid
 
 
+def find_no_data_place(points: np.ndarray, lower: np.ndarray, upper: np.ndarray) -> np.ndarray | None:
+    """Return which points share one place far from the scan, (N,) bool, such as 0, 0, 0 where the scanner got no echo; None if none do.
+
+    Parameters
+    ----------
+    points : (N, 3) float64 array [scan unit]
+        Finite.
+    lower, upper : their smallest and largest coordinates [scan unit]
+    """
+    if len(points) < FEWEST_POINTS:
+        return None
+    some = np.unique(points[:: max(len(points) // POINTS_OF_MIDDLE, 1)], axis=0)
+    with np.errstate(over="ignore", invalid="ignore"):
+        low, middle, high = np.percentile(some, [25.0, 50.0, 75.0], axis=0)
+        width, away = float((high - low).max()), np.maximum(upper - middle, middle - lower)
+        axis = int(away.argmax())
+        if not 0.0 < FAR_FROM_MIDDLE * width < away[axis]:
+            return None
+    farthest = upper[axis] if upper[axis] - middle[axis] > middle[axis] - lower[axis] else lower[axis]
+    at: np.ndarray = points[:, axis] == farthest
+    count = int(at.sum())
+    one_place = count >= FEWEST_NO_DATA and bool((points[at] == points[at][0]).all())
+    return at if one_place and count <= NO_DATA_SHARES[1] * len(points) else None
+
+
+def no_data_place_note(count: int, place: np.ndarray) -> str:
+    """Return a note on points that are left out for this."""
+    said = ", ".join(f"{coordinate + 0.0:.10g}" for coordinate in place)
+    return f"{count:,} points stand at ({said}), far from the others, as where there is no data, and are left out"
+
+
 def have_one_height(points: np.ndarray) -> bool:
     """Whether invalid points (K, 3) are some that have the same height, as where a raster has no data."""
     return len(points) >= FEWEST_NO_DATA and bool(points[:, 2].min() == points[:, 2].max())
@@ -168,20 +203,29 @@ def find_no_data(points: np.ndarray) -> tuple[np.ndarray, float] | None:
 
 
 def _has_cliff(level: np.ndarray, rest: np.ndarray) -> bool:
-    """Whether the slope from level points (K, 3) to the nearest of the rest (M, 3) is far steeper than slopes within the rest."""
+    """Whether the slope from level points (K, 3) to the nearest of the rest (M, 3) is far steeper than slopes within the rest.
+
+    These are taken to be no less than one step of the heights: those of whole metres are mostly level.
+    """
+    step = float(np.diff(np.unique(rest[:, 2])).min())
     rest = rest[:: len(rest) // SOME_OF_RASTER + 1]
 
-    def steepness(some: np.ndarray, itself: bool) -> float:
+    def steepness(some: np.ndarray, itself: bool) -> tuple[float, float]:
         some = some[:: len(some) // 200 + 1]
         away = np.hypot(*(some[:, None, axis] - rest[:, axis] for axis in (0, 1)))
         if itself:
             away[away == 0.0] = np.inf
         nearest = away.argmin(axis=1)
         near = away[np.arange(len(some)), nearest]
-        shore = near <= 3.0 * np.median(near)
-        return float(np.median(np.abs(some[:, 2] - rest[nearest, 2])[shore] / near[shore]))
+        shore = (near > 0.0) & (near <= 3.0 * np.median(near))
+        if not shore.any():
+            return 0.0, math.inf
+        return float(np.median(np.abs(some[:, 2] - rest[nearest, 2])[shore] / near[shore])), float(
+            np.median(near[shore])
+        )
 
-    return steepness(level, itself=False) > STEEP_CLIFF * steepness(rest, itself=True)
+    slope, apart = steepness(rest, itself=True)
+    return steepness(level, itself=False)[0] > STEEP_CLIFF * max(slope, step / apart)
 
 
 def no_data_note(count: int, value: float) -> str:
@@ -193,6 +237,24 @@ def check_sensible(extent: float, said: str) -> None:
     """Refuse an extent that no scan has."""
     if not EXTENTS_READ[0] <= extent <= EXTENTS_READ[1]:
         raise InputError(f"{said}the points span {extent:.3g}, as no scan does; {CAUSE}")
+
+
+def single_precision_note(cloud: PointCloud) -> tuple[str, ...]:
+    """Return a note on a cloud whose coordinates were rounded to single precision so far from zero that steps show; else none."""
+    some = cloud.points[:: max(len(cloud.points) // POINTS_OF_EXTENT, 1)] + cloud.origin
+    with np.errstate(over="ignore"):
+        rounded = some.astype(np.float32)
+    step = np.spacing(np.median(np.abs(rounded), axis=0)).astype(np.float64)
+    sides = np.sort(np.ptp(usual_extent(cloud.points), axis=0))
+    apart = math.sqrt(float(sides[1] * sides[2]) / len(cloud.points))
+    coarse = np.flatnonzero((rounded == some).all(axis=0) & (step > SINGLE_STEP * apart))
+    if not len(coarse):
+        return ()
+    names, unit = " and ".join("xyz"[axis] for axis in coarse), f" {cloud.unit}" if cloud.unit else ""
+    return (
+        f"{names} {'are' if len(coarse) > 1 else 'is'} in steps of up to {step[coarse].max():.2g}{unit}, rounded to single precision"
+        " (float32) far from zero: export the scan again in double precision, or moved near zero",
+    )
 
 
 def degrees_note(cloud: PointCloud) -> tuple[str, ...]:

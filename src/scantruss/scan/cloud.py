@@ -17,9 +17,11 @@ from .checks import (
     check_sensible,
     find_invalid,
     find_no_data,
+    find_no_data_place,
     have_one_height,
     invalid_values_note,
     no_data_note,
+    no_data_place_note,
     usual_extent,
 )
 from .units import check_unit
@@ -28,6 +30,7 @@ Bounds = tuple[np.ndarray, np.ndarray]  #: the smallest and the largest coordina
 
 INVALID = "with coordinates a million times too large"
 AT_NO_DATA = "with a height that stands for no data"
+AT_NO_DATA_PLACE = "at a place that stands for no data"
 LARGEST_COORDINATE = 1e100  # coordinates beyond this overflow when squared
 SURVEY_UNITS = ("m", "foot")  # scans in these have z up
 SURVEY_FILES = (".las", ".laz", ".e57", ".pts", ".ptx")  # files of scans that have z up, whatever their unit
@@ -134,6 +137,12 @@ class PointCloud:
             left_out = ((AT_NO_DATA if have_one_height(clean[invalid]) else INVALID, int(invalid.sum())),)
             clean = clean[~invalid]
             normals = normals if normals is None else normals[~invalid]
+            lower, upper = bounds_of(clean)
+        if (at_place := find_no_data_place(clean, lower, upper)) is not None:
+            notes = (*notes, no_data_place_note(int(at_place.sum()), clean[at_place][0]))
+            left_out = (*left_out, (AT_NO_DATA_PLACE, int(at_place.sum())))
+            clean = np.ascontiguousarray(clean[~at_place])
+            normals = normals if normals is None else normals[~at_place]
             lower, upper = bounds_of(clean)
         if (no_data := find_no_data(clean)) is not None:
             at, value = no_data

@@ -16,6 +16,16 @@ RANDOM_GAPS = (
 USUAL_GAPS = 3.5  # distances to the sixth neighbour in a suggested length, which suits evenly meshed scans
 USUAL_MEMBERS = 25.0  #: members along the longest side of a scan, for a suggested length
 LARGEST_PER_EXTENT = 3.5  #: above this share of the scan's extent a grid says nothing of its shape
+MESH_FILES = (
+    ".obj",
+    ".stl",
+    ".off",
+    ".3mf",
+    ".gltf",
+    ".glb",
+    ".vtp",
+    ".vtu",
+)  #: files of meshes, of which the vertices are read
 SOME_POINTS = 8_000  #: points of a first look at how far apart they lie
 SURELY_FEWER = 4  #: times as many in a scan: then they lie closer than in that look
 
@@ -41,7 +51,7 @@ def check_length(cloud: PointCloud, settings: Settings) -> None:
     if low > high:
         raise InputError(
             f"this scan carries no grid: members must be at least {round_length(low, 'up'):g}{unit} long for {apart}, and at most"
-            f" {round_length(high, 'down'):g} for {extent}; scan it more densely"
+            f" {round_length(high, 'down'):g} for {extent}; {denser_words(cloud)}"
         )
     if longest > high * (1 + 1e-9):
         raise LengthError(
@@ -52,6 +62,13 @@ def check_length(cloud: PointCloud, settings: Settings) -> None:
         raise LengthError(
             f"{what.format('shortest')} {shortest:g}{unit} is too small for {apart}; use at least {round_length(low, 'up'):g}"
         )
+
+
+def denser_words(cloud: PointCloud) -> str:
+    """Say what helps where a scan has too few points for any length."""
+    if cloud.name.lower().endswith(MESH_FILES):
+        return "of a mesh the vertices alone are read, so divide its triangles first, or sample points on them"
+    return "scan it more densely"
 
 
 def exact_range(cloud: PointCloud) -> tuple[float, float]:

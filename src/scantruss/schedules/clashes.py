@@ -20,6 +20,7 @@ NO_MOMENT = 1e-6  # [m]: moment over force up to which it is one of rounding
 HEAVY_BALLS = "balls are heavier than the node allowance of the structure"
 TOO_HEAVY = 1.1  # times its allowance for nodes from which the balls of a structure are too heavy for it
 SOME_WEIGHT = 0.02  # share of the mass of the members up to which balls are not worth a warning
+MOST_IN_BALLS = 50.0  # share of the length of all members above which the balls are too large for them [%]
 WarningRow = tuple[Value, ...]
 
 
@@ -29,6 +30,7 @@ def warnings_table(parts: Parts) -> Schedule:
         *_scale(parts),
         *_small_angles(parts),
         *_clashes(parts),
+        *_large_balls(parts),
         *_touching_balls(parts),
         *_crossing(parts),
         *_folds(parts),
@@ -100,6 +102,15 @@ def _clashes(parts: Parts) -> list[WarningRow]:
              float(parts.cut[member]), 0.0, "mm", *place.tolist())
         )  # fmt: skip
     return rows
+
+
+def _large_balls(parts: Parts) -> list[WarningRow]:
+    """Balls in which most of the members end, as those of tubes too thick for their length [% of the length of the members]."""
+    share = 100.0 * (1.0 - float(np.maximum(parts.cut, 0.0).sum() / parts.length.sum()))
+    if share <= MOST_IN_BALLS:
+        return []
+    measure = "% of the length of the members"
+    return [("balls take most of the members", None, None, share, MOST_IN_BALLS, measure, None, None, None)]
 
 
 def _touching_balls(parts: Parts) -> list[WarningRow]:

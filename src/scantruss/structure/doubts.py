@@ -1,4 +1,4 @@
-"""What looks odd in what was given: supports, and combinations of a file."""
+"""What looks odd in what was given: which way is up, supports, and combinations of a file."""
 
 from __future__ import annotations
 
@@ -6,6 +6,10 @@ import numpy as np
 
 from .truss import Truss
 
+ONE_WAY, SIDEWAYS = (
+    0.6,
+    2.0,
+)  #: share of the surface that faces one way on the mean; ratio of its parts along x or y and along z: it may lie on its side
 MANY_HELD = 0.8  #: share of the nodes of a structure from which supports are odd
 
 
@@ -25,8 +29,8 @@ def support_words(truss: Truss) -> str:
 
 
 def doubts_of(truss: Truss) -> list[str]:
-    """Return warnings of supports that hold most of a structure, and of combinations that leave out what is usually looked at."""
-    said = []
+    """Return warnings of a structure on its side, of supports that hold most of it, and of combinations that leave out something."""
+    said = _sideways(truss)
     held, used = _held(truss), np.unique(truss.members)
     if len(held) > MANY_HELD * len(used):
         said.append(
@@ -41,6 +45,19 @@ def doubts_of(truss: Truss) -> list[str]:
         )
         said.append(f"the combinations that were given have none of {missing}; those of EN 1990 are not added to them")
     return said
+
+
+def _sideways(truss: Truss) -> list[str]:
+    """Return a warning where the surface faces x or y, as that of a roof whose file has y up."""
+    areas = truss.triangle_areas
+    facing = np.abs(areas.sum(axis=0))
+    axis = int(facing[:2].argmax())
+    if np.linalg.norm(facing) < ONE_WAY * np.linalg.norm(areas, axis=1).sum() or facing[axis] <= SIDEWAYS * facing[2]:
+        return []
+    name = "xy"[axis]
+    return [
+        f"the surface faces {name} and weight acts along z; where {name} is up in the file, turn the scan first, so that z is"
+    ]
 
 
 def _held(truss: Truss) -> np.ndarray:

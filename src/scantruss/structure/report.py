@@ -322,6 +322,17 @@ def mode_lines(report: StructureReport) -> list[str]:
     return said
 
 
+def sizing_lines(report: StructureReport) -> list[str]:
+    """Return a line where the sections are larger than the members need, so that the structure does not buckle too early."""
+    passed = [each for each in report.rounds if each.buckling is not None]
+    if len(passed) < 2:
+        return []
+    return [
+        f"all members pass at {passed[0].mass:,.0f} kg, but there the structure buckles at {passed[0].buckling:.3g} times its loads;"
+        f" larger sections raise that to {passed[-1].buckling:.3g}"
+    ]
+
+
 STRUCTURE_HEAD = (
     "load case", "applied z [kN]", "reaction z [kN]", "moves [mm]", "force min [kN]", "force max [kN]", "utilization",
 )  # fmt: skip

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...errors import InputError
+from ...errors import InputError, unit_words
 from ...grid.grid import Grid
 from ...grid.marks import node_marks
 from ...schedules.joints import check_grid, clear_radii, find_joints
@@ -46,9 +46,10 @@ def build_nodes(
     used = np.flatnonzero(joints.valence)
     names = node_marks(grid)
     if (worst := used[needed[used].argmax()]) >= 0 and needed[worst] > node:
+        unit = unit_words(grid.unit)
         raise InputError(
-            f"the sockets of {names[worst]} would meet in a ball of {node:g}; it needs a --node-diameter of"
-            f" {needed[worst]:.4g}, or thinner members"
+            f"the sockets of {names[worst]} would meet in a ball of {node:g}{unit}; it needs a --node-diameter of"
+            f" {needed[worst]:.4g}{unit}, or thinner members"
         )
     balls = balls_of(grid, used, np.zeros((len(used), 3)), node / 2, sides, marks)
     made = []

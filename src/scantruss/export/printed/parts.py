@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import InputError
+from ...errors import InputError, unit_words
 from ...grid.grid import Grid
 from ...grid.marks import member_marks, numbered
 from ...kernels.geometry.components import component_labels
@@ -66,16 +66,17 @@ def check_joint(grid: Grid, member: float, node: float, scale: float, clearance:
     if not 0 < clearance < np.inf:
         raise InputError(f"the clearance must be a positive number, got {clearance}")
     joint = Joint(max(node, THINNEST * member) / 2, clearance)
+    unit = unit_words(grid.unit)
     if clearance > joint.radius / 4:
         raise InputError(
-            f"the clearance {clearance:g} leaves no wall around a socket in couplings of {2 * joint.radius:.4g};"
-            f" give at most {joint.radius / 4:.3g} or a larger --node-diameter"
+            f"the clearance {clearance:g}{unit} leaves no wall around a socket in couplings of {2 * joint.radius:.4g}{unit};"
+            f" give at most {joint.radius / 4:.3g}{unit} or a larger --node-diameter"
         )
     short = int(np.argmin(grid.lengths))
     if (room := float(grid.lengths[short]) * scale / 2 - node / 2) < joint.reach:
         raise InputError(
-            f"the member {member_marks(grid)[short]} has {room:.4g} from its middle to the ball and a plug joint needs"
-            f" {joint.reach:.4g}; give smaller diameters, a smaller --clearance or a larger --scale"
+            f"the member {member_marks(grid)[short]} has {room:.4g}{unit} from its middle to the ball and a plug joint needs"
+            f" {joint.reach:.4g}{unit}; give smaller diameters, a smaller --clearance or a larger --scale"
         )
     return joint
 
@@ -95,7 +96,9 @@ def _outside_up(axes: np.ndarray, normal: np.ndarray) -> np.ndarray:
     return axes if axes[2] @ normal >= 0 else axes * np.array([[1.0], [-1.0], [-1.0]])
 
 
-def divide(nodes: np.ndarray, edges: np.ndarray, bed: Bed, pad: float, pad_cut: float) -> tuple[np.ndarray, np.ndarray]:
+def divide(
+    nodes: np.ndarray, edges: np.ndarray, bed: Bed, pad: float, pad_cut: float, unit: str = ""
+) -> tuple[np.ndarray, np.ndarray]:
     """Return the part of each node (V,), and for each member (E, 3) the direction in which its two parts come apart; 0 within one.
 
     Parameters
@@ -131,7 +134,8 @@ def divide(nodes: np.ndarray, edges: np.ndarray, bed: Bed, pad: float, pad_cut: 
         if len(ids) == 1 or depth == MOST_HALVINGS:
             words = " x ".join(f"{side:.4g}" for side in size)
             raise InputError(
-                f"a node with half of its members needs {words} and the bed is {' x '.join(f'{b:g}' for b in bed)};"
+                f"a node with half of its members needs {words}{unit_words(unit)} and the bed is"
+                f" {' x '.join(f'{b:g}' for b in bed)}{unit_words(unit)};"
                 " give a larger --bed or a smaller --scale"
             )
         axis = flat_axes(nodes[ids])[0]
@@ -163,7 +167,7 @@ def build_parts(
     used, edges = np.unique(grid.edges, return_inverse=True)
     edges = edges.reshape(-1, 2)
     nodes = np.asarray(grid.nodes[used], np.float64) * scale
-    part_of, pulled = divide(nodes, edges, bed, node / 2, joint.reach)
+    part_of, pulled = divide(nodes, edges, bed, node / 2, joint.reach, grid.unit)
     if (along := (np.diff(nodes[edges], axis=1)[:, 0] * pulled).sum(axis=1)).any():
         edges = np.where((along < 0)[:, None], edges[:, ::-1], edges)  # from the side with pegs to that with sockets
     balls = balls_of(grid, used, nodes, node / 2, sides, marks)
@@ -205,11 +209,11 @@ def build_parts(
                 used[ids],
             )
         )
-    check_apart(made)
+    check_apart(made, grid.unit)
     return made
 
 
-def check_apart(parts: list[PrintedPart]) -> None:
+def check_apart(parts: list[PrintedPart], unit: str = "") -> None:
     """Refuse parts that overlap, where couplings lie too near to other members."""
     boxes = np.array([part.body.bounding_box() for part in parts])
     for a, b in combinations(range(len(parts)), 2):
@@ -217,8 +221,8 @@ def check_apart(parts: list[PrintedPart]) -> None:
             continue
         if (shared := (parts[a].body ^ parts[b].body).volume()) > OVERLAP * parts[a].body.volume():
             raise InputError(
-                f"{parts[a].name} and {parts[b].name} would overlap by {shared:.3g}, where plug joints lie close;"
-                " give smaller diameters or a larger --scale"
+                f"{parts[a].name} and {parts[b].name} would overlap by {shared:.3g}{unit_words(unit, power=3)},"
+                " where plug joints lie close; give smaller diameters or a larger --scale"
             )
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import InputError
+from ...errors import InputError, unit_words
 from ..solid import as_solid
 from ..solid_files import Solid
 
@@ -41,7 +41,7 @@ class PlateSpot:
     turned: bool
 
 
-def pack(sizes: np.ndarray, bed: Bed, gap: float) -> list[list[PlateSpot]]:
+def pack(sizes: np.ndarray, bed: Bed, gap: float, unit: str = "") -> list[list[PlateSpot]]:
     """Return plates of parts in shelves: the deepest first, each in the first shelf with room.
 
     Parameters
@@ -62,7 +62,9 @@ def pack(sizes: np.ndarray, bed: Bed, gap: float) -> list[list[PlateSpot]]:
     wide, deep = (np.where(turned, sizes[:, 1 - k], sizes[:, k]) for k in (0, 1))
     if (off := np.flatnonzero((wide > bed[0]) | (deep > bed[1]) | (sizes[:, 2] > bed[2]))).size:
         words = " x ".join(f"{side:.4g}" for side in sizes[off[0]])
-        raise InputError(f"a part of {words} does not fit on the bed; give a larger --bed or a smaller --scale")
+        raise InputError(
+            f"a part of {words}{unit_words(unit)} does not fit on the bed; give a larger --bed or a smaller --scale"
+        )
     for part in np.lexsort((np.arange(len(sizes)), -deep)).tolist():
         w, d = float(wide[part]), float(deep[part])
         shelf = next((s for s in shelves if s[2] >= d and s[3] + gap + w <= bed[0]), None)
@@ -84,7 +86,7 @@ def lay_out(parts: list[PrintedPart], bed: Bed, gap: float, unit: str) -> list[l
     lying = [part.lying() for part in parts]
     sizes = np.array([np.subtract(body.bounding_box()[3:], body.bounding_box()[:3]) for body in lying])
     plates = []
-    for places in pack(sizes, bed, gap):
+    for places in pack(sizes, bed, gap, unit):
         solids = []
         for place in sorted(places, key=lambda each: each.part):
             part = parts[place.part]

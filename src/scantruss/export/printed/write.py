@@ -101,7 +101,9 @@ def print_parts(
             marks=marks,
         )
     elif bed is None:
-        raise InputError("parts need the bed on which they are to fit, such as --bed 200x200x200, or --sockets")
+        raise InputError(
+            "parts need the bed on which they are to fit, such as --bed 200x200x200 for a grid in mm, or --sockets"
+        )
     else:
         parts = build_parts(
             grid,

@@ -13,6 +13,8 @@ from ..geometry.planes import plane_of
 from ..geometry.triangles import distance_to_triangle
 from ..geometry.vectors import Vector, dot, norm, row, subtract
 
+MOST_ENTRIES = 1000  # most entries of a triangle on average, beyond which boxes are larger: some triangles are far longer than others
+BOX_GROWTHS = 60  # times that boxes are made twice as large at most: from any size to one box
 RADIUS_GROWTHS = 90  # times that a reach grows by half at most: from any box to all of them
 
 
@@ -27,11 +29,16 @@ class TriangleBoxes(NamedTuple):
 
 
 def triangle_boxes(nodes: np.ndarray, triangles: np.ndarray, box: float, reach: float) -> TriangleBoxes:
-    """Return triangles (T, 3) of nodes (V, 3) by search boxes no larger than `box` [scan unit]."""
+    """Return triangles (T, 3) of nodes (V, 3) by search boxes no larger than `box` [scan unit], unless some triangles are very long."""
     corners = nodes[triangles]
     middle = corners.mean(axis=1)
     radius = np.sqrt(((corners - middle[:, None]) ** 2).sum(axis=2).max(axis=1))
     lower, upper = corners.min(axis=(0, 1)) - reach, corners.max(axis=(0, 1)) + reach
+    sides = corners.max(axis=1) - corners.min(axis=1) + 2.0 * reach
+    for _ in range(BOX_GROWTHS):
+        if (sides / box + 1.0).prod(axis=1).sum() <= MOST_ENTRIES * len(triangles):
+            break
+        box *= 2.0
     empty = new_boxes(lower, upper, box, 1, 1)
     count = enter_triangles(empty, nodes, triangles, reach, np.empty(0, np.int64))
     boxes = new_boxes(lower, upper, box, count, count)

@@ -30,7 +30,11 @@ POINTS_OF_PATCH = 28  # points of the surface from which the distance of a point
 STANDS_OFF = 5.0  # distance from that surface, in multiples of the expected one, above which a point is off it
 LEAST_EXPECTED = 0.01  # least expected distance, in radii of that surface
 SMALLEST_PART = 8  # fewest doubted points that make a part of a sheet
-OPEN_EDGE = 0.05  # share of them at a free edge above which they are a fringe of the scan
+OPEN_EDGE = (
+    0.05  # share of them at a free edge above which they are a fringe of the scan, unless they are many and compact
+)
+# fewest of these; most at a free edge, in square roots of their number: hardly more than three sides of a square
+MANY_OF_PART, EDGE_OF_COMPACT = 200, 3.3
 LONE_SHARE = 3e-4  # share of samples without neighbours above which outliers are sought
 
 
@@ -99,7 +103,8 @@ def judge_points(points: np.ndarray, distance: float, length: float = np.inf) ->
 def _on_sheets(near: Nearby, alive: np.ndarray, reach: np.ndarray, doubted: np.ndarray) -> np.ndarray:
     """Return which of the doubted points (D,) lie on a sheet that they form with each other: a sparse part inside the scan.
 
-    A few in one plane may be random, and a sparse fringe beyond the edge of the scan is no part of it.
+    A few in one plane may be random, and a sparse fringe beyond the edge of the scan is no part of it; a wide sparse part there is,
+    as what lies far from the scanner.
     """
     company, at_edge = np.empty((len(doubted), kernels.COMPANY), np.int64), np.zeros(len(doubted), np.bool_)
     number = np.full(len(alive), -1)
@@ -116,7 +121,8 @@ def _on_sheets(near: Nearby, alive: np.ndarray, reach: np.ndarray, doubted: np.n
     one, other = np.nonzero((beside >= 0) & on[:, None] & on[beside])
     part = component_labels(len(doubted), one, beside[one, other])
     size, edges = np.bincount(part, on, len(doubted)), np.bincount(part, on & at_edge, len(doubted))
-    found: np.ndarray = on & ((size >= SMALLEST_PART) & (edges <= OPEN_EDGE * size))[part]
+    compact = (size >= MANY_OF_PART) & (edges <= EDGE_OF_COMPACT * np.sqrt(size))
+    found: np.ndarray = on & ((size >= SMALLEST_PART) & (edges <= OPEN_EDGE * size) | compact)[part]
     return found
 
 

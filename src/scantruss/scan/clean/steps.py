@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...errors import InputError
+from ...errors import InputError, unit_words
 from ...runtime.progress import Progress
 from ..cloud import PointCloud
 from .duplicates import find_near_duplicates, find_repeated
@@ -126,7 +126,7 @@ class _Work:
     """A scan while it is cleaned."""
 
     def __init__(self, cloud: PointCloud, progress: Progress | None) -> None:
-        self.points = cloud.points
+        self.points, self._unit = cloud.points, unit_words(cloud.unit)
         self.kept = np.arange(len(cloud.points))
         self.steps: list[Step] = []
         self._progress = progress
@@ -185,7 +185,8 @@ class _Work:
         moved, normals = onto_surfaces(near, surfaces)
         if smooth:
             way = np.linalg.norm(moved - near.tree.points, axis=1)
-            self.add("noise", len(way), f"points moved onto the surface, by {np.sqrt((way**2).mean()):.3g} (rms)")
+            by = f"{np.sqrt((way**2).mean()):.3g}{self._unit}"
+            self.add("noise", len(way), f"points moved onto the surface, by {by} (rms)")
             self.points = near.in_order(moved)
         self._normals = near.in_order(normals)
 

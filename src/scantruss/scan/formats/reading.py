@@ -12,7 +12,7 @@ import numpy as np
 from ...errors import FormatError, InputError
 from ...runtime.files import nearest_suffix
 from ...selection import Selection
-from ..checks import degrees_note, extent_note, extent_of
+from ..checks import degrees_note, extent_note, extent_of, single_precision_note
 from ..cloud import PointCloud
 from ..units import check_unit, name_of
 from .choose import check_attributes, choose, describe_points, places_in
@@ -86,7 +86,7 @@ def read_points(path: FileNames, unit: str = "", selection: Selection | None = N
     cloud = PointCloud.from_array(points, unit=unit, name=name_of_files(path), normals=given)
     left_out = add_counts([*(part.left_out for part in parts), dict(cloud.left_out)])
     said = system_of_all([(part.system, part.in_system) for part in parts])
-    notes = (*notes, *cloud.notes, *degrees_note(cloud))
+    notes = (*notes, *cloud.notes, *degrees_note(cloud), *single_precision_note(cloud))
     return replace(cloud, notes=notes, left_out=tuple(left_out.items()), system=said)
 
 

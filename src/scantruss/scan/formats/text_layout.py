@@ -81,6 +81,8 @@ def find_layout(path: Path, wanted: Sequence[str] = ()) -> Layout:
         _check_not_grouped(path, rows)
     if (separator, comma) == (",", True):
         _check_not_thousands(path, rows)
+    if (separator, comma) == (",", False):
+        _check_not_split_in_two(path, rows)
     split = [(number, split_line(line, separator)) for number, line in enumerate(start)]
     data = [(number, row) for number, row in split if count_numbers(row, comma) >= 3]
     behind = sum(bool(row) for number, row in split if data and number >= data[0][0])
@@ -163,6 +165,25 @@ def _check_not_thousands(path: Path, rows: Sequence[str]) -> None:
         raise FormatError(
             f'{path}: the comma in "{said}" may be a decimal sign or stand between thousands; export it with decimal points'
         )
+
+
+def _check_not_split_in_two(path: Path, rows: Sequence[str]) -> None:
+    """Refuse 12,045,3,210,7,008: commas as decimal signs and as separators, as zeros lead in every second field."""
+    split = [row for row in (split_line(row, ",") for row in rows) if len(row) >= 6 and all(map(_is_whole, row))]
+    if 2 * len(split) < len(rows):
+        return
+    for first in (1, 2):  # the first field may be the number of the point
+        behind = [[row[first + 2 * axis] for row in split if first + 2 * axis < len(row)] for axis in range(3)]
+        if all(any(re.fullmatch(r"0\d+", field) for field in fields) for fields in behind):
+            said = ",".join(split[0])[:60]
+            raise FormatError(
+                f"{path}: in {said!r} commas are decimal signs and separate the numbers too; export it with decimal points, or with"
+                " semicolons between the numbers"
+            )
+
+
+def _is_whole(field: str) -> bool:
+    return re.fullmatch(r"[+-]?\d+", field) is not None
 
 
 def _check_no_points(path: Path, header: Sequence[str], separator: str | None, comma: bool) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...runtime.memory import available_memory
 from ...runtime.progress import Progress
-from ..checks import POINTS_OF_BULK, degrees_note, usual_extent
+from ..checks import POINTS_OF_BULK, degrees_note, single_precision_note, usual_extent
 from ..cloud import LARGEST_COORDINATE, PointCloud
 from ..formats.kinds import read_head
 from ..formats.paths import FileNames, files_of, name_of_files
@@ -108,7 +108,7 @@ def read_thinned(names: FileNames, settings: Settings, progress: Progress | None
     )
     check_enough(thinned, float(settings.thin_spacing or 0.0), "--thin-spacing")
     cloud = PointCloud.from_array(thinned.points, unit=thinned.unit, name=name_of_files(names))
-    notes = (*thinned.notes, *cloud.notes, *degrees_note(cloud))
+    notes = (*thinned.notes, *cloud.notes, *degrees_note(cloud), *single_precision_note(cloud))
     return replace(cloud, dropped=thinned.dropped, notes=notes, system=thinned.system), thinned.read
 
 
