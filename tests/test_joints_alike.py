@@ -10,8 +10,9 @@ from small_grids import dome, fan, make_grid, uneven
 import scantruss as st
 from scantruss.cli.main import main
 from scantruss.errors import InputError
-from scantruss.layouts import joints_alike
+from scantruss.layouts import alike
 from scantruss.layouts.images import Images
+from scantruss.layouts.joints_alike import stars_of
 from scantruss.scan.rotation import turn_about
 
 
@@ -30,11 +31,11 @@ def best_misfit(one: np.ndarray, other: np.ndarray, turns: int = 7200) -> float:
 @pytest.mark.kernels
 def test_misfits_are_those_of_the_best_turn() -> None:
     grid = uneven(5)
-    stars = joints_alike._stars_of(grid)
-    directions, sizes = stars.directions(grid.nodes)
+    stars = stars_of(grid)
+    directions, sizes = stars.members(grid.nodes)
     own = stars.own(directions)
-    inner = np.flatnonzero((stars.is_open == 0) & (stars.valence == 6))[:4]
-    misfit, shift = stars.misfits(directions, inner)
+    inner = np.flatnonzero((stars.is_open == 0) & (stars.count == 6))[:4]
+    misfit, shift = stars.misfits(directions, inner, mirrored=False)
     assert np.allclose(misfit[inner, np.arange(len(inner))], 0, atol=1e-7) and (misfit[stars.is_open == 1] == 2).all()
     for one in inner.tolist():
         for column, other in enumerate(inner.tolist()):
@@ -48,11 +49,11 @@ def test_misfits_are_those_of_the_best_turn() -> None:
 
 
 def test_rings_run_anticlockwise_from_the_boundary() -> None:
-    stars = joints_alike._stars_of(fan())
+    stars = stars_of(fan())
     assert stars.is_open.tolist() == [0, 1, 1, 1, 1, 1, 1]
     for k in range(6):
         assert stars.ring[1 + k, :3].tolist() == [1 + (k + 1) % 6, 0, 1 + (k - 1) % 6]
-    normals = stars.normals(stars.directions(fan().nodes)[0])
+    normals = stars.normals(stars.vectors(fan().nodes))
     assert normals == pytest.approx(np.tile([0.0, 0.0, 1.0], (7, 1)))
 
 
@@ -60,12 +61,12 @@ def test_aims_of_equal_joints_are_where_their_members_are() -> None:
     grid = dome(6)
     flat = grid.replace(nodes=grid.nodes * [1, 1, 0])
     found = st.few_joints(flat)
-    stars = joints_alike._stars_of(flat)
-    directions, _ = stars.directions(flat.nodes)
-    misfit, shift = stars.misfits(directions, found.representative)
+    stars = stars_of(flat)
+    directions = stars.vectors(flat.nodes)
+    misfit, shift = stars.misfits(directions, found.representative, mirrored=False)
     near = misfit.argmin(axis=1)
     every = np.arange(len(near))
-    aims = joints_alike._aims(
+    aims = alike._aims(
         stars, directions, near, shift[every, near], np.ones(len(near), bool), len(found.representative)
     )
     assert aims == pytest.approx(directions, abs=1e-7)
@@ -136,5 +137,7 @@ def test_the_command_makes_few_joints(
     report = json.loads(Path("report.json").read_text())
     assert sum(each["nodes"] for each in report["kinds"]) == 36 and len(report["kinds"]) < report["kinds_before"]
     assert "kinds of joints before" in capsys.readouterr().out
-    assert main([*words.split(), "--force", "--plot", "plot.png"]) == 2
-    assert "leave it out with --parts joints" in capsys.readouterr().err
+    assert main([*words.split(), "--force", "--plot", "plot.png"]) == 0
+    trade = [each["kinds"] for each in report["trade"]]
+    assert trade == sorted(set(trade), reverse=True) and Path("plot.png").stat().st_size > 10_000
+    assert trade[0] == report["kinds_before"] and trade[-1] == len(report["kinds"])
