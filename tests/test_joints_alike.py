@@ -66,9 +66,7 @@ def test_aims_of_equal_joints_are_where_their_members_are() -> None:
     misfit, shift = stars.misfits(directions, found.representative, mirrored=False)
     near = misfit.argmin(axis=1)
     every = np.arange(len(near))
-    aims = alike._aims(
-        stars, directions, near, shift[every, near], np.ones(len(near), bool), len(found.representative)
-    )
+    aims = alike._aims(stars, directions, near, shift[every, near], np.ones(len(near), bool), len(found.representative))
     assert aims == pytest.approx(directions, abs=1e-7)
     assert found.before == len(found.representative) and np.array_equal(found.grid.nodes, flat.nodes)
 
@@ -88,6 +86,28 @@ def test_there_are_fewer_kinds_of_joints_and_nodes_stay_on_the_surface() -> None
     assert np.abs(nodes[:, 2] - surface)[inner].max() < 0.05 * mean
     again = st.few_joints(grid, 0.02)
     assert np.array_equal(again.grid.nodes, nodes)
+
+
+@pytest.mark.parametrize("bound", [0.05, 0.2])
+def test_members_stay_as_even_as_is_asked_for_or_as_they_were(bound: float) -> None:
+    grid = uneven(7)
+    mean = float(grid.lengths.mean())
+    found = st.few_joints(grid, 0.02, uneven=bound)
+    beyond = np.abs(found.grid.lengths / mean - 1) - np.maximum(np.abs(grid.lengths / mean - 1), bound)
+    assert len(found.counts) < found.before and beyond.max() <= 0.01
+
+
+def test_mirror_images_of_joints_are_of_one_kind_where_it_is_asked_for() -> None:
+    grid = three_parts()
+    both = grid.replace(
+        nodes=np.concatenate([grid.nodes, grid.nodes * [-1, 1, 1] + [9, 0, 0]]),
+        triangles=np.concatenate([grid.triangles, grid.triangles[:, ::-1] + len(grid.nodes)]),
+        fixed=np.zeros(2 * len(grid.nodes), bool),
+    )
+    apart, same = (st.few_joints(both, 1e-3, 999, mirrored=mirrored) for mirrored in (False, True))
+    assert same.before < apart.before and same.mirrored.any() and not apart.mirrored.any()
+    assert same.before <= st.few_joints(grid, 1e-3, 999).before
+    assert same.misfit.max() <= 1e-3 and np.array_equal(same.grid.nodes, both.nodes)
 
 
 def three_parts() -> st.Grid:

@@ -60,9 +60,7 @@ def test_slopes_are_differences(make: type[Parts]) -> None:
     ways = np.random.default_rng(2).standard_normal((len(grid.nodes), 2, 3))
     move = np.random.default_rng(3).standard_normal((len(grid.nodes), 2))
     small = 1e-6
-    after, before = (
-        parts.vectors(grid.nodes + sign * small * np.einsum("vkc,vk->vc", ways, move)) for sign in (1, -1)
-    )
+    after, before = (parts.vectors(grid.nodes + sign * small * np.einsum("vkc,vk->vc", ways, move)) for sign in (1, -1))
     of = parts.nodes_of
     moves = np.where((of >= 0)[..., None], move[of], 0.0)
     change = np.einsum("nwcmk,nmk->nwc", parts.slopes(grid.nodes, ways), moves)
@@ -94,7 +92,11 @@ def test_panels_of_triangles_and_quads_come_to_fewer_kinds_on_their_surface() ->
 def test_hexagons_that_are_alike_stay_as_they_are() -> None:
     found = st.few_panels(honeycomb())
     assert found.before == len(found.counts) == 1 and np.array_equal(found.grid.nodes, honeycomb().nodes)
-    shaken = honeycomb().nodes + 0.04 * np.random.default_rng(1).standard_normal((len(honeycomb().nodes), 3)) * [1, 1, 0]
+    shaken = honeycomb().nodes + 0.04 * np.random.default_rng(1).standard_normal((len(honeycomb().nodes), 3)) * [
+        1,
+        1,
+        0,
+    ]
     few = st.few_panels(grid_of(shaken, honeycomb().panel_table), 0.01)
     assert len(few.counts) < 0.8 * few.before
 

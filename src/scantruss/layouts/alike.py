@@ -94,7 +94,7 @@ def few_kinds(grid: Grid, parts: Parts, tolerance: float, count: int, *, mirrore
 
     Each round gives every part the nearest of some of the kinds that hold the most, and moves the nodes by a damped Gauss-Newton step that
     brings its vectors to the mean of the kind; parts beyond the tolerance weigh more from round to round. It goes on from the fewest kinds
-    so far, in one way after the other until none comes to fewer; once from the grid as it is, and once after a few rounds that draw all
+    so far, in one way after the other until none comes to fewer; once from the grid as it is, and twice after some rounds that draw all
     parts that may be alike, of as many vectors, to one kind.
 
     Parameters
@@ -265,6 +265,7 @@ def kinds_report(before: Grid, found: PartKinds, tolerance: float) -> dict[str, 
                 found.representative.tolist(), found.counts.tolist(), mirrored.tolist(), strict=True
             )
         ],
+        "kind_of": found.of.tolist(),
     }
 
 

@@ -12,6 +12,7 @@ from ...layouts.families import few_lengths, least_misfit
 from .structure import drawing_defaults, png_of
 
 COUNTS = (3, 5, 7, 9, 12, 16, 20)  #: lengths that are tried
+LEAST_TICK = 0.04  #: between two numbers below the picture, over its width
 
 
 def encode_families(
@@ -78,22 +79,32 @@ def _picture(counted: str, measure: str, points: list[_Point], off_before: float
         )
         axes = parts[0, 0]
         axes.plot(counts, [100 * each.plain for each in points], "o--", label="sorted as they are")
-        axes.plot(counts, [100 * each.misfit for each in points], "o-", label="after moving the nodes")
+        axes.plot(
+            counts,
+            [100 * each.misfit for each in points],
+            "o-",
+            label="after moving the nodes, the farthest by so many % of a member",
+        )
         for each in points:
             axes.annotate(
-                f"{100 * each.moved:.2g} % moved", (each.number, 100 * each.misfit), (0, 6),
+                f"{100 * each.moved:.2g}", (each.number, 100 * each.misfit), (0, 6),
                 textcoords="offset points", fontsize=7, ha="center",
             )  # fmt: skip
         axes.set_ylabel(measure)
-        axes.margins(y=0.12)
         axes.legend()
         if off_before is not None:
             parts[1, 0].plot(counts, [100 * (each.off_scan or 0.0) for each in points], "o-", color="tab:orange")
             parts[1, 0].axhline(100 * off_before, linestyle="--")
             parts[1, 0].set_ylabel("farthest node\noff the scan [%]")
         for each in parts[:, 0]:
+            each.margins(y=0.12)
             each.set_ylim(bottom=0)
             each.grid(alpha=0.3)
         parts[-1, 0].set_xlabel(counted)
-        parts[-1, 0].set_xticks(counts)
+        apart = LEAST_TICK * (max(counts) - min(counts))
+        ticks = sorted(counts)[:1]
+        for count in sorted(counts)[1:]:
+            if count - ticks[-1] >= apart:
+                ticks.append(count)
+        parts[-1, 0].set_xticks(ticks)
         return png_of(figure)
