@@ -1,6 +1,7 @@
 """Few panels: misfits against a slow twin, slopes against differences, fewer kinds, surface and places kept, and the command."""
 
 import json
+from collections.abc import Callable
 from itertools import product
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from test_joints_alike import three_parts
 from test_layouts_of_quads import grid_of, honeycomb, vault
 
 import scantruss as st
+from scantruss.cli.families import _of_kinds, families_parser
 from scantruss.cli.main import main
 from scantruss.errors import InputError
 from scantruss.export.json import encode_json
@@ -18,7 +20,7 @@ from scantruss.layouts.alike import trade_of
 from scantruss.layouts.images import Images
 from scantruss.layouts.joints_alike import stars_of
 from scantruss.layouts.panels_alike import corners_of
-from scantruss.layouts.parts import Parts
+from scantruss.layouts.part_vectors import PartVectors
 
 
 def laid(one: np.ndarray, other: np.ndarray) -> float:
@@ -54,9 +56,9 @@ def test_misfits_are_those_of_one_panel_laid_on_the_other(mirrored: bool) -> Non
 
 
 @pytest.mark.parametrize("make", [corners_of, stars_of])
-def test_slopes_are_differences(make: type[Parts]) -> None:
+def test_slopes_are_differences(make: Callable[[st.Grid], PartVectors]) -> None:
     grid = vault(3, uneven=0.2)
-    parts: Parts = make(grid)  # type: ignore[arg-type]
+    parts = make(grid)
     ways = np.random.default_rng(2).standard_normal((len(grid.nodes), 2, 3))
     move = np.random.default_rng(3).standard_normal((len(grid.nodes), 2))
     small = 1e-6
@@ -137,6 +139,15 @@ def test_the_trade_begins_with_the_grid_as_it_was() -> None:
     plain = [each["plain_misfit_max"] for each in trade]
     assert plain == sorted(plain) and plain[-1] > 0.02
     assert all(each["misfit_max"] <= 0.02 for each in trade)
+
+
+@pytest.mark.parametrize("far", [0.04, 0.06])
+def test_nodes_far_off_the_scan_are_warned_of(far: float) -> None:
+    grid = uneven(5)
+    found = st.few_panels(grid, 0.05)
+    values = families_parser().parse_args(["grid.json", "out.json", "--parts", "panels", "--tolerance", "5%"])
+    _, words, _ = _of_kinds(grid, found, values, lambda _: far * float(grid.lengths.mean()))
+    assert any("members off the scan" in line for line in words) == (far > 0.05)
 
 
 @pytest.mark.parametrize(

@@ -23,9 +23,10 @@ if TYPE_CHECKING:
     OffScan = Callable[[Grid], float] | None
     Told = tuple[dict[str, Any], list[str], Callable[[], bytes]]
 
-LENGTHS, JOINTS, PANELS = ALIKE = ("lengths", "joints", "panels")  # what shall be alike
+LENGTHS_ALIKE, JOINTS, PANELS = ALIKE = ("lengths", "joints", "panels")  # what shall be alike
 USUAL_LENGTHS = 12  # that are aimed at
-DIFFERENT, SAME = MIRROR_IMAGES = ("different", "same")  # what mirror images are
+NEAR_SCAN = 0.05  # distance of a node from the scan that is warned of beyond [mean members]
+MIRROR_IMAGES = ("different", "same")  # what mirror images are
 
 
 def families_parser() -> Parser:
@@ -42,7 +43,7 @@ def families_parser() -> Parser:
     parser.add_argument(
         "--parts",
         choices=ALIKE,
-        default=LENGTHS,
+        default=LENGTHS_ALIKE,
         help="what shall be alike: lengths of members, joints, as the directions of their members, or panels (default lengths)",
     )
     parser.add_argument(
@@ -100,7 +101,7 @@ def families(values: Namespace) -> None:
     report = None if values.report is None else check_place(values.report, (".json",))
     plot = None if values.plot is None else check_place(values.plot, (".png",))
     taken = {Path(name).resolve(): what for name, what in ((values.grid, "grid"), (values.scan, "scan")) if name}
-    if values.parts == LENGTHS and values.mirrored is not None:
+    if values.parts == LENGTHS_ALIKE and values.mirrored is not None:
         raise InputError("lengths have no mirror images; leave --mirrored out, or use --parts joints or panels")
     if values.parts != JOINTS and values.uneven is not None:
         raise InputError(f"--uneven is for --parts joints; leave it out with {values.parts}")
@@ -185,14 +186,14 @@ class _Scan(NamedTuple):
 def _alike(before: Grid, values: Namespace) -> Families | PartKinds:
     """Return the grid with its lengths, joints or panels alike."""
     from ..layouts.families import few_lengths
-    from ..layouts.joints_alike import UNEVEN, few_joints
+    from ..layouts.joints_alike import USUAL_UNEVENNESS, few_joints
     from ..layouts.panels_alike import few_panels
 
-    if values.parts == LENGTHS:
+    if values.parts == LENGTHS_ALIKE:
         return few_lengths(before, values.tolerance, _lengths_wanted(values))
-    count, mirrored = 1 if values.count is None else values.count, values.mirrored == SAME
+    count, mirrored = 1 if values.count is None else values.count, values.mirrored == MIRROR_IMAGES[1]
     if values.parts == JOINTS:
-        uneven = UNEVEN if values.uneven is None else values.uneven
+        uneven = USUAL_UNEVENNESS if values.uneven is None else values.uneven
         return few_joints(before, values.tolerance, count, mirrored=mirrored, uneven=uneven)
     return few_panels(before, values.tolerance, count, mirrored=mirrored)
 
@@ -219,7 +220,13 @@ def _of_kinds(before: Grid, found: PartKinds, values: Namespace, off_scan: OffSc
     figures = kinds_report(before, found, values.tolerance)
     if values.report is not None or values.plot is not None:
         figures["trade"] = trade_of(before, found, off_scan)
-    return figures, _words_of_kinds(figures, values.parts), lambda: encode_kinds(figures["trade"], values.parts)
+    words = _words_of_kinds(figures, values.parts)
+    far = 0.0 if off_scan is None else off_scan(found.grid) / float(before.lengths.mean())
+    if far > NEAR_SCAN:
+        words.append(
+            f"warning: a node is {far:.2g} members off the scan; more kinds, by --count, keep nodes nearer: see the trade of --report"
+        )
+    return figures, words, lambda: encode_kinds(figures["trade"], values.parts)
 
 
 def _words(figures: dict[str, Any]) -> list[str]:

@@ -15,20 +15,20 @@ from ..grid.grid import Grid
 from ..grid.panels import triangles_of
 from .charts import Charts, shortened
 from .images import Images
-from .parts import APART, Parts
+from .part_vectors import APART, PartVectors
 
 REGULAR_ROUNDS = (12, 24)  #: in which all parts that may be alike are drawn to one kind, before each further descent
-ROUNDS = 400  #: of assignment and relaxation after that, and of the grid as it was
+ALIKE_ROUNDS = 400  #: of assignment and relaxation after that, and of the grid as it was
 ROUNDS_OF_WAY = 25  #: after which another way is tried to come to fewer kinds
-MOST_PARTS = 6000  #: any two of which are compared
+MOST_ALIKE = 6000  #: any two of which are compared
 NEARLY_ALIKE = 0.1  #: of the tolerance, within which a part is taken to be its representative
 STIFFNESS_OF_NODE = 0.02  #: weight of staying where one is
 STIFFNESS_OF_PARTS = 0.004  #: the same over all that pulls at a node
 STEP_OF_NODE = 0.05  #: farthest move of a node in one round, over the mean member
-LEAST_PART = 0.3  #: weight of a part within the tolerance
-BISECTIONS = 20  #: of the least misfit
+WEIGHT_WITHIN = 0.3  #: weight of a part within the tolerance
+MISFIT_BISECTIONS = 20  #: of the least misfit
 STAGES_TOLD = 8  #: at most, of all that were on the way
-LEAST_TOLERANCE, MOST_TOLERANCE = 1e-4, 0.2  #: of parts that are alike
+LEAST_MISFIT, MOST_MISFIT = 1e-4, 0.2  #: of parts that are alike
 
 
 class _Way(NamedTuple):
@@ -39,7 +39,7 @@ class _Way(NamedTuple):
     most: float  #: weight of such a part
 
 
-WAYS = tuple(
+WAYS_TO_FEWER = tuple(
     _Way(share, *weights) for share in (0.93, 0.85, 0.99, 0.75) for weights in ((1.3, 500.0), (1.15, 50.0))
 )  #: tried in turn, the first again after each that has come to fewer kinds
 
@@ -62,7 +62,7 @@ class PartKinds:
     mirrored: np.ndarray  #: (N,) bool, whether it is the mirror image of its kind
     misfit: np.ndarray  #: (N,) root mean square of what is between its vectors and those of its kind
     moved: np.ndarray  #: (V,) how far each node has moved [unit of the grid]
-    parts: Parts
+    parts: PartVectors
     mirror_images_alike: bool
     stages: tuple[Stage, ...]  #: the grid as it was, and each time on the way that there were fewer kinds
 
@@ -79,17 +79,17 @@ class PartKinds:
 
 def check_alike(grid: Grid, tolerance: float, count: int, parts: str, number: int) -> None:
     """Refuse a grid or a value that parts cannot be made alike with; parts: what they are called, number: how many there are."""
-    if not LEAST_TOLERANCE <= tolerance <= MOST_TOLERANCE:
+    if not LEAST_MISFIT <= tolerance <= MOST_MISFIT:
         raise InputError(f"the tolerance of {parts} is 0.01% to 20%, got {tolerance!r}")
     if count < 1:
         raise InputError(f"the number of kinds must be 1 or more, got {count}")
     if len(grid.edges) == 0 or not grid.topology.manifold:
         raise InputError(f"few {parts} need a manifold grid with members")
-    if number > MOST_PARTS:
-        raise InputError(f"of {MOST_PARTS:,} {parts} at most few kinds are made, got {number:,}")
+    if number > MOST_ALIKE:
+        raise InputError(f"of {MOST_ALIKE:,} {parts} at most few kinds are made, got {number:,}")
 
 
-def few_kinds(grid: Grid, parts: Parts, tolerance: float, count: int, *, mirrored: bool) -> PartKinds:
+def few_kinds(grid: Grid, parts: PartVectors, tolerance: float, count: int, *, mirrored: bool) -> PartKinds:
     """Return the grid with its nodes moved along its surface so that its parts are of few kinds.
 
     Each round gives every part the nearest of some of the kinds that hold the most, and moves the nodes by a damped Gauss-Newton step that
@@ -100,7 +100,7 @@ def few_kinds(grid: Grid, parts: Parts, tolerance: float, count: int, *, mirrore
     Parameters
     ----------
     grid : Grid
-    parts : Parts
+    parts : PartVectors
         Of the grid.
     tolerance : float
         Largest root mean square of what is between the vectors of two parts of one kind.
@@ -126,10 +126,10 @@ def _fewest(descent: _Descent, start: Stage, count: int) -> list[Stage]:
     stages = [start]
     rounds = failed = 0
     while (
-        len(stages[-1].kinds) > count and failed < len(WAYS) and rounds < ROUNDS
+        len(stages[-1].kinds) > count and failed < len(WAYS_TO_FEWER) and rounds < ALIKE_ROUNDS
     ):  # ends: each turn is a round at least
         before = stages[-1]
-        for state in descent.along(before.nodes, WAYS[failed]):
+        for state in descent.along(before.nodes, WAYS_TO_FEWER[failed]):
             rounds += 1
             if len(state.kinds) < len(stages[-1].kinds):
                 stages.append(state.stage())
@@ -155,7 +155,7 @@ class _State(NamedTuple):
 class _Descent(NamedTuple):
     """What moves nodes, and when parts are alike."""
 
-    parts: Parts
+    parts: PartVectors
     charts: Charts
     images: Images
     tolerance: float
@@ -182,12 +182,12 @@ class _Descent(NamedTuple):
         """Yield the state after each round that is to come to fewer kinds."""
         state = self.at(nodes)
         aim = max(min(len(state.kinds) - 1, int(way.share * len(state.kinds))), 1)
-        weight = np.full(len(state.vectors), LEAST_PART)
+        weight = np.full(len(state.vectors), WEIGHT_WITHIN)
         for _ in range(ROUNDS_OF_WAY):
             wanted = state.kinds[:aim]
             within = state.misfit[:, wanted].min(axis=1) <= self.tolerance
             heavier = np.minimum(np.maximum(weight, 1) * way.heavier, way.most)
-            weight = np.where(within, np.maximum(weight / way.heavier, LEAST_PART), heavier)
+            weight = np.where(within, np.maximum(weight / way.heavier, WEIGHT_WITHIN), heavier)
             state = self._drawn(state, wanted, within, weight, NEARLY_ALIKE * self.tolerance)
             yield state
             if len(state.kinds) <= aim:
@@ -229,7 +229,7 @@ def trade_of(before: Grid, found: PartKinds, off_scan: Callable[[Grid], float] |
     told = []
     for stage in (found.stages[k] for k in which):
         low, high = 0.0, APART
-        for _ in range(BISECTIONS):
+        for _ in range(MISFIT_BISECTIONS):
             middle = (low + high) / 2
             few = len(_kinds(misfit <= middle, found.parts.count > 0)) <= len(stage.kinds)
             low, high = (low, middle) if few else (middle, high)
@@ -284,7 +284,7 @@ def _kinds(near: np.ndarray, used: np.ndarray) -> np.ndarray:
 
 
 def _aims(
-    parts: Parts, vectors: np.ndarray, near: np.ndarray, shift: np.ndarray, within: np.ndarray, number: int
+    parts: PartVectors, vectors: np.ndarray, near: np.ndarray, shift: np.ndarray, within: np.ndarray, number: int
 ) -> np.ndarray:
     """Return where the vectors (N, W, 3) of each part would be in the mean part of its kind, turned to it."""
     width = vectors.shape[1]
@@ -320,7 +320,7 @@ def _turns(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     return np.asarray(left @ right)
 
 
-def _step(parts: Parts, charts: Charts, place: np.ndarray, pull: np.ndarray, weight: np.ndarray) -> np.ndarray:
+def _step(parts: PartVectors, charts: Charts, place: np.ndarray, pull: np.ndarray, weight: np.ndarray) -> np.ndarray:
     """Return moves (V, 2) on the charts by a damped Gauss-Newton step that adds `pull` (N, W, 3) to the vectors, as they turn."""
     ways, nodes = charts.ways(place), charts.moved(place)
     number = len(weight)

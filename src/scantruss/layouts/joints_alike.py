@@ -9,15 +9,17 @@ import numpy as np
 from ..errors import InputError
 from ..grid.grid import Grid
 from .alike import PartKinds, check_alike, few_kinds
-from .parts import Parts
+from .part_vectors import PartVectors
 
-UNEVEN = 0.2  #: by how far lengths may be off the mean member, beside those that were before, over it; usually
+USUAL_UNEVENNESS = (
+    0.2  #: by how far lengths may be off the mean member, beside those that were before, over it; usually
+)
 MOST_UNEVEN = 0.9  #: that can be asked for
 HOLD_OF_LENGTH = 10.0  #: weight of what is beyond, over that of a direction
 
 
 def few_joints(
-    grid: Grid, tolerance: float = 0.01, count: int = 1, *, mirrored: bool = False, uneven: float = UNEVEN
+    grid: Grid, tolerance: float = 0.01, count: int = 1, *, mirrored: bool = False, uneven: float = USUAL_UNEVENNESS
 ) -> PartKinds:
     """Return the grid with its nodes moved along its surface so that there are few different joints.
 
@@ -50,7 +52,7 @@ def few_joints(
 
 
 @dataclass(frozen=True, eq=False)
-class Stars(Parts):
+class Stars(PartVectors):
     """Joints as unit vectors along their members."""
 
     called, size_is = "node", "members"
@@ -70,18 +72,18 @@ class Stars(Parts):
         return way / np.maximum(size, 1e-300)[..., None], size
 
     def vectors(self, nodes: np.ndarray) -> np.ndarray:
-        """Return the vectors, see `Parts`."""
+        """Return the vectors, see `PartVectors`."""
         return self.members(nodes)[0]
 
     def slopes(self, nodes: np.ndarray, ways: np.ndarray) -> np.ndarray:
-        """Return how the vectors change, see `Parts`."""
+        """Return how the vectors change, see `PartVectors`."""
         along, size = self.members(nodes)
         across = np.eye(3) - along[..., None] * along[..., None, :]
         across *= np.where(self.ring >= 0, 1.0 / np.maximum(size, 1e-300), 0.0)[..., None, None]
         return self._by_node(np.swapaxes(across, -1, -2), ways)
 
     def held(self, nodes: np.ndarray, ways: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return by how much members are too long or too short, see `Parts`."""
+        """Return by how much members are too long or too short, see `PartVectors`."""
         along, size = self.members(nodes)
         excess = np.clip(size, self.least, self.greatest) - size
         holds = np.where(excess == 0, 0.0, HOLD_OF_LENGTH)
@@ -97,11 +99,11 @@ class Stars(Parts):
         return found
 
     def shaped(self, vectors: np.ndarray) -> np.ndarray:
-        """Return the means as unit vectors, see `Parts`."""
+        """Return the means as unit vectors, see `PartVectors`."""
         return vectors / np.maximum(np.linalg.norm(vectors, axis=2, keepdims=True), 1e-300)
 
 
-def stars_of(grid: Grid, uneven: float = UNEVEN) -> Stars:
+def stars_of(grid: Grid, uneven: float = USUAL_UNEVENNESS) -> Stars:
     """Return the stars of the nodes of a grid."""
     count = len(grid.nodes)
     ends = np.concatenate([grid.edges, grid.edges[:, ::-1]])

@@ -9,7 +9,7 @@ import numpy as np
 from ..grid.grid import Grid
 from ..grid.panels import sizes_of
 from .alike import PartKinds, check_alike, few_kinds
-from .parts import Parts
+from .part_vectors import PartVectors
 
 
 def few_panels(grid: Grid, tolerance: float = 0.01, count: int = 1, *, mirrored: bool = False) -> PartKinds:
@@ -39,7 +39,7 @@ def few_panels(grid: Grid, tolerance: float = 0.01, count: int = 1, *, mirrored:
 
 
 @dataclass(frozen=True, eq=False)
-class Corners(Parts):
+class Corners(PartVectors):
     """Panels as vectors from their middles to their corners."""
 
     called, size_is = "panel", "nodes"
@@ -47,14 +47,14 @@ class Corners(Parts):
     mean: float  #: mean member [unit of the grid]
 
     def vectors(self, nodes: np.ndarray) -> np.ndarray:
-        """Return the vectors over the mean member, see `Parts`."""
+        """Return the vectors over the mean member, see `PartVectors`."""
         there = (self.nodes_of >= 0)[..., None]
         corners = np.where(there, nodes[self.nodes_of], 0.0)
         middle = corners.sum(axis=1) / self.count[:, None]
         return np.asarray(np.where(there, corners - middle[:, None], 0.0) / self.mean)
 
     def slopes(self, nodes: np.ndarray, ways: np.ndarray) -> np.ndarray:
-        """Return how the vectors change, see `Parts`."""
+        """Return how the vectors change, see `PartVectors`."""
         there = self.nodes_of >= 0
         both = there[:, :, None] & there[:, None]
         shares = np.where(both, np.eye(there.shape[1]) - 1.0 / self.count[:, None, None], 0.0) / self.mean

@@ -14,7 +14,7 @@ APART = 2.0  #: misfit of parts that cannot be alike
 
 
 @dataclass(frozen=True, eq=False)
-class Parts(ABC):
+class PartVectors(ABC):
     """Joints or panels of a grid, each as vectors around a point, anticlockwise as seen from outside."""
 
     called: ClassVar[str]  #: what stands for one in a report
