@@ -23,9 +23,9 @@ if TYPE_CHECKING:
     OffScan = Callable[[Grid], float] | None
     Told = tuple[dict[str, Any], list[str], Callable[[], bytes]]
 
-LENGTHS_ALIKE, JOINTS, PANELS = ALIKE = ("lengths", "joints", "panels")  # what shall be alike
+LENGTHS_ALIKE, JOINTS, _ = ALIKE = ("lengths", "joints", "panels")  # what shall be alike
 USUAL_LENGTHS = 12  # that are aimed at
-NEAR_SCAN = 0.05  # distance of a node from the scan that is warned of beyond [mean members]
+WARNED_OFF_SCAN = 0.05  # distance of a node from the scan that is warned of beyond [mean members]
 MIRROR_IMAGES = ("different", "same")  # what mirror images are
 
 
@@ -222,7 +222,7 @@ def _of_kinds(before: Grid, found: PartKinds, values: Namespace, off_scan: OffSc
         figures["trade"] = trade_of(before, found, off_scan)
     words = _words_of_kinds(figures, values.parts)
     far = 0.0 if off_scan is None else off_scan(found.grid) / float(before.lengths.mean())
-    if far > NEAR_SCAN:
+    if far > WARNED_OFF_SCAN:
         words.append(
             f"warning: a node is {far:.2g} members off the scan; more kinds, by --count, keep nodes nearer: see the trade of --report"
         )
