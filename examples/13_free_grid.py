@@ -47,9 +47,7 @@ def planarity(grid: st.Grid) -> float:
     return float(1 + np.mean(off))
 
 
-def main(
-    folder: Path = Path(), names: Sequence[str] = tuple(SHELLS), count: int = 40_000
-) -> dict[str, st.JointFamilies]:
+def main(folder: Path = Path(), names: Sequence[str] = tuple(SHELLS), count: int = 40_000) -> dict[str, st.PartKinds]:
     """Make the quads of each shell, move their nodes so that joints are alike, and print freeGrid's metrics of buildability."""
     made = {}
     for name in names:

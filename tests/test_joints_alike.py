@@ -10,8 +10,9 @@ from small_grids import dome, fan, make_grid, uneven
 import scantruss as st
 from scantruss.cli.main import main
 from scantruss.errors import InputError
-from scantruss.layouts import joints_alike
+from scantruss.layouts import alike
 from scantruss.layouts.images import Images
+from scantruss.layouts.joints_alike import stars_of
 from scantruss.scan.rotation import turn_about
 
 
@@ -30,11 +31,11 @@ def best_misfit(one: np.ndarray, other: np.ndarray, turns: int = 7200) -> float:
 @pytest.mark.kernels
 def test_misfits_are_those_of_the_best_turn() -> None:
     grid = uneven(5)
-    stars = joints_alike._stars_of(grid)
-    directions, sizes = stars.directions(grid.nodes)
+    stars = stars_of(grid)
+    directions, sizes = stars.members(grid.nodes)
     own = stars.own(directions)
-    inner = np.flatnonzero((stars.is_open == 0) & (stars.valence == 6))[:4]
-    misfit, shift = stars.misfits(directions, inner)
+    inner = np.flatnonzero((stars.is_open == 0) & (stars.count == 6))[:4]
+    misfit, shift = stars.misfits(directions, inner, mirrored=False)
     assert np.allclose(misfit[inner, np.arange(len(inner))], 0, atol=1e-7) and (misfit[stars.is_open == 1] == 2).all()
     for one in inner.tolist():
         for column, other in enumerate(inner.tolist()):
@@ -48,11 +49,11 @@ def test_misfits_are_those_of_the_best_turn() -> None:
 
 
 def test_rings_run_anticlockwise_from_the_boundary() -> None:
-    stars = joints_alike._stars_of(fan())
+    stars = stars_of(fan())
     assert stars.is_open.tolist() == [0, 1, 1, 1, 1, 1, 1]
     for k in range(6):
         assert stars.ring[1 + k, :3].tolist() == [1 + (k + 1) % 6, 0, 1 + (k - 1) % 6]
-    normals = stars.normals(stars.directions(fan().nodes)[0])
+    normals = stars.normals(stars.vectors(fan().nodes))
     assert normals == pytest.approx(np.tile([0.0, 0.0, 1.0], (7, 1)))
 
 
@@ -60,14 +61,12 @@ def test_aims_of_equal_joints_are_where_their_members_are() -> None:
     grid = dome(6)
     flat = grid.replace(nodes=grid.nodes * [1, 1, 0])
     found = st.few_joints(flat)
-    stars = joints_alike._stars_of(flat)
-    directions, _ = stars.directions(flat.nodes)
-    misfit, shift = stars.misfits(directions, found.representative)
+    stars = stars_of(flat)
+    directions = stars.vectors(flat.nodes)
+    misfit, shift = stars.misfits(directions, found.representative, mirrored=False)
     near = misfit.argmin(axis=1)
     every = np.arange(len(near))
-    aims = joints_alike._aims(
-        stars, directions, near, shift[every, near], np.ones(len(near), bool), len(found.representative)
-    )
+    aims = alike._aims(stars, directions, near, shift[every, near], np.ones(len(near), bool), len(found.representative))
     assert aims == pytest.approx(directions, abs=1e-7)
     assert found.before == len(found.representative) and np.array_equal(found.grid.nodes, flat.nodes)
 
@@ -87,6 +86,28 @@ def test_there_are_fewer_kinds_of_joints_and_nodes_stay_on_the_surface() -> None
     assert np.abs(nodes[:, 2] - surface)[inner].max() < 0.05 * mean
     again = st.few_joints(grid, 0.02)
     assert np.array_equal(again.grid.nodes, nodes)
+
+
+@pytest.mark.parametrize("bound", [0.05, 0.2])
+def test_members_stay_as_even_as_is_asked_for_or_as_they_were(bound: float) -> None:
+    grid = uneven(7)
+    mean = float(grid.lengths.mean())
+    found = st.few_joints(grid, 0.02, uneven=bound)
+    beyond = np.abs(found.grid.lengths / mean - 1) - np.maximum(np.abs(grid.lengths / mean - 1), bound)
+    assert len(found.counts) < found.before and beyond.max() <= 0.01
+
+
+def test_mirror_images_of_joints_are_of_one_kind_where_it_is_asked_for() -> None:
+    grid = three_parts()
+    both = grid.replace(
+        nodes=np.concatenate([grid.nodes, grid.nodes * [-1, 1, 1] + [9, 0, 0]]),
+        triangles=np.concatenate([grid.triangles, grid.triangles[:, ::-1] + len(grid.nodes)]),
+        fixed=np.zeros(2 * len(grid.nodes), bool),
+    )
+    apart, same = (st.few_joints(both, 1e-3, 999, mirrored=mirrored) for mirrored in (False, True))
+    assert same.before < apart.before and same.mirrored.any() and not apart.mirrored.any()
+    assert same.before <= st.few_joints(grid, 1e-3, 999).before
+    assert same.misfit.max() <= 1e-3 and np.array_equal(same.grid.nodes, both.nodes)
 
 
 def three_parts() -> st.Grid:
@@ -136,5 +157,7 @@ def test_the_command_makes_few_joints(
     report = json.loads(Path("report.json").read_text())
     assert sum(each["nodes"] for each in report["kinds"]) == 36 and len(report["kinds"]) < report["kinds_before"]
     assert "kinds of joints before" in capsys.readouterr().out
-    assert main([*words.split(), "--force", "--plot", "plot.png"]) == 2
-    assert "leave it out with --parts joints" in capsys.readouterr().err
+    assert main([*words.split(), "--force", "--plot", "plot.png"]) == 0
+    trade = [each["kinds"] for each in report["trade"]]
+    assert trade == sorted(set(trade), reverse=True) and Path("plot.png").stat().st_size > 10_000
+    assert trade[0] == report["kinds_before"] and trade[-1] == len(report["kinds"])

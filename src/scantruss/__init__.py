@@ -40,12 +40,13 @@ if TYPE_CHECKING:  # a name is imported when it is first used, so that the comma
     from .grid.quality import GridQuality as GridQuality
     from .grid.topology import Topology as Topology
     from .improve.optimize import optimize_grid as optimize_grid
+    from .layouts.alike import PartKinds as PartKinds
     from .layouts.double_layer import DoubleLayer as DoubleLayer
     from .layouts.double_layer import double_layer as double_layer
     from .layouts.families import Families as Families
     from .layouts.families import few_lengths as few_lengths
-    from .layouts.joints_alike import JointFamilies as JointFamilies
     from .layouts.joints_alike import few_joints as few_joints
+    from .layouts.panels_alike import few_panels as few_panels
     from .pipeline import grid_from_points as grid_from_points
     from .pipeline import grid_from_scan as grid_from_scan
     from .scan.clean.steps import CleanCloud as CleanCloud
@@ -87,7 +88,7 @@ _HOMES = {
     "grid_from_points": "pipeline", "grid_from_scan": "pipeline",
     "write": "export.formats", "read_model": "export.formats", "FileStyle": "export.style", "read_grid": "export.json",
     "few_lengths": "layouts.families", "Families": "layouts.families",
-    "few_joints": "layouts.joints_alike", "JointFamilies": "layouts.joints_alike",
+    "few_joints": "layouts.joints_alike", "few_panels": "layouts.panels_alike", "PartKinds": "layouts.alike",
     "double_layer": "layouts.double_layer", "DoubleLayer": "layouts.double_layer",
     "print_model": "export.solid", "print_parts": "export.printed.write", "PrintedParts": "export.printed.write",
     "schedule": "schedules.make", "ScheduleSettings": "schedules.settings", "write_schedules": "schedules.files",

@@ -1,4 +1,4 @@
-"""The command ``scantruss families``: members of few lengths."""
+"""The command ``scantruss families``: members of few lengths, few different joints or panels."""
 
 from __future__ import annotations
 
@@ -10,15 +10,23 @@ from ..errors import InputError
 from .outputs import claim, outs_of
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from ..boundary.find import Boundary
     from ..grid.grid import Grid
+    from ..layouts.alike import PartKinds
     from ..layouts.families import Families
-    from ..layouts.joints_alike import JointFamilies
     from ..settings import Settings
     from ..surface.samples import SurfaceSamples
     from .options import Parser
 
-ALIKE = ("lengths", "joints")  # what shall be alike
+    OffScan = Callable[[Grid], float] | None
+    Told = tuple[dict[str, Any], list[str], Callable[[], bytes]]
+
+LENGTHS_ALIKE, JOINTS, _ = ALIKE = ("lengths", "joints", "panels")  # what shall be alike
+USUAL_LENGTHS = 12  # that are aimed at
+WARNED_OFF_SCAN = 0.05  # distance of a node from the scan that is warned of beyond [mean members]
+MIRROR_IMAGES = ("different", "same")  # what mirror images are
 
 
 def families_parser() -> Parser:
@@ -27,39 +35,52 @@ def families_parser() -> Parser:
 
     parser = Parser(
         "families",
-        "GRID OUT [OUT ...] [--parts lengths|joints] [--tolerance 1%%] [--count 12] [--scan SCAN] [options]",
-        "Move the nodes of a saved grid along its surface, so that its members are of few lengths, or its joints alike.",
+        "GRID OUT [OUT ...] [--parts lengths|joints|panels] [--tolerance 1%%] [--count 12] [--scan SCAN] [options]",
+        "Move the nodes of a saved grid along its surface, so that its members are of few lengths, or its joints or panels of few kinds.",
     )
     parser.add_argument("grid", metavar="GRID", help="grid saved as .json by scantruss grid")
     add_outs(parser, "results; the suffix names the format", "*")
     parser.add_argument(
         "--parts",
         choices=ALIKE,
-        default=ALIKE[0],
-        help="what shall be alike: the lengths of the members, or the joints, as the directions of their members (default lengths)",
+        default=LENGTHS_ALIKE,
+        help="what shall be alike: lengths of members, joints, as the directions of their members, or panels (default lengths)",
     )
     parser.add_argument(
         "--tolerance",
         metavar="SHARE",
         type=share,
         default=0.01,
-        help="largest misfit over the mean member, of joints that of unit directions, as root mean square (default 1%%)",
+        help="largest misfit over the mean member, of joints that of unit directions, of panels that of corners, both as root mean square"
+        " (default 1%%)",
     )
     parser.add_argument(
         "--count",
         metavar="COUNT",
         type=whole_number,
-        default=12,
-        help="lengths to aim at (default 12); of joints there are as few as can be",
+        help=f"lengths or kinds to aim at (default {USUAL_LENGTHS} lengths; of joints and panels as few kinds as can be)",
+    )
+    parser.add_argument(
+        "--mirrored",
+        choices=MIRROR_IMAGES,
+        help="whether mirror images of joints or panels are of one kind, as flat panels are that may be turned over (default different)",
+    )
+    parser.add_argument(
+        "--uneven",
+        metavar="SHARE",
+        type=share,
+        help="of joints, by how much members may differ from the mean one, beside those that do already (default 20%%)",
     )
     parser.add_argument("--scan", metavar="SCAN", help="scan that the grid is checked against again: its certificate")
     parser.add_argument(
-        "--report", metavar="FILE", help="families with their members, and lengths before and after, .json"
+        "--report",
+        metavar="FILE",
+        help="families with their members, or kinds with their parts, before and after, .json",
     )
     parser.add_argument(
         "--plot",
         metavar="FILE.png",
-        help="number of lengths against the largest misfit, and with --scan against the distance from it",
+        help="number of lengths or kinds against the largest misfit, and with --scan against the distance from it",
     )
     parser.add_argument(
         "--keep-failed", action="store_true", help="also take and write a grid that fails its certificate"
@@ -68,7 +89,7 @@ def families_parser() -> Parser:
 
 
 def families(values: Namespace) -> None:
-    """Write a saved grid with members of few lengths."""
+    """Write a saved grid with members of few lengths, or few kinds of joints or panels."""
     from ..export.formats import GRID, check_output
     from ..report.terminal import Bars, print_lines
     from ..runtime.files import SaveTogether, check_place
@@ -80,18 +101,18 @@ def families(values: Namespace) -> None:
     report = None if values.report is None else check_place(values.report, (".json",))
     plot = None if values.plot is None else check_place(values.plot, (".png",))
     taken = {Path(name).resolve(): what for name, what in ((values.grid, "grid"), (values.scan, "scan")) if name}
-    if plot is not None and values.parts != ALIKE[0]:
-        raise InputError("--plot draws lengths; leave it out with --parts joints")
+    if values.parts == LENGTHS_ALIKE and values.mirrored is not None:
+        raise InputError("lengths have no mirror images; leave --mirrored out, or use --parts joints or panels")
+    if values.parts != JOINTS and values.uneven is not None:
+        raise InputError(f"--uneven is for --parts joints; leave it out with {values.parts}")
     claim_models(outs, taken, force=values.force)
     for place, what in ((report, "report"), (plot, "picture")):
         if place is not None:
             claim(place, what, taken, force=values.force)
-    from ..export.drawing.families import encode_families
     from ..export.json import read_grid
     from ..export.model import model_of_grid
     from ..grid.certificate import check_passed
-    from ..layouts.families import Families, family_report
-    from ..layouts.joints_alike import joint_report
+    from ..layouts.families import Families
 
     with Bars() as bars, SaveTogether("" if values.force else "result") as save:
         bars("read", 0.0)
@@ -101,19 +122,16 @@ def families(values: Namespace) -> None:
         found = _alike(before, values)
         scan = _Scan.of_grid(before, values) if values.scan else None
         made = scan.certified(found.grid, keep_failed=values.keep_failed) if scan else found.grid
+        off_scan = scan and scan.farthest_node
         if isinstance(found, Families):
-            figures = family_report(before, found, values.tolerance)
-            words = _words(figures)
+            figures, words, picture = _of_lengths(before, found, values, off_scan)
         else:
-            figures = joint_report(found, values.tolerance, float(before.lengths.mean()))
-            words = _words_of_joints(figures)
+            figures, words, picture = _of_kinds(before, found, values, off_scan)
         wrote = write_models(model_of_grid(made), outs, save, bars)
         if report is not None:
             save.json(report, figures)
         if plot is not None:
-            save.beside(plot).write_bytes(
-                encode_families(before, values.tolerance, off_scan=scan and scan.farthest_node)
-            )
+            save.beside(plot).write_bytes(picture())
     wrote += [place for place in (report, plot) if place is not None]
     print_lines([*words, *_after(values), f"wrote {' '.join(map(str, wrote))}"])
 
@@ -165,14 +183,50 @@ class _Scan(NamedTuple):
         return float(np.nanmax(nodes))
 
 
-def _alike(before: Grid, values: Namespace) -> Families | JointFamilies:
-    """Return the grid with its lengths or its joints alike."""
+def _alike(before: Grid, values: Namespace) -> Families | PartKinds:
+    """Return the grid with its lengths, joints or panels alike."""
     from ..layouts.families import few_lengths
-    from ..layouts.joints_alike import few_joints
+    from ..layouts.joints_alike import USUAL_UNEVENNESS, few_joints
+    from ..layouts.panels_alike import few_panels
 
-    if values.parts == ALIKE[1]:
-        return few_joints(before, values.tolerance)
-    return few_lengths(before, values.tolerance, values.count)
+    if values.parts == LENGTHS_ALIKE:
+        return few_lengths(before, values.tolerance, _lengths_wanted(values))
+    count, mirrored = 1 if values.count is None else values.count, values.mirrored == MIRROR_IMAGES[1]
+    if values.parts == JOINTS:
+        uneven = USUAL_UNEVENNESS if values.uneven is None else values.uneven
+        return few_joints(before, values.tolerance, count, mirrored=mirrored, uneven=uneven)
+    return few_panels(before, values.tolerance, count, mirrored=mirrored)
+
+
+def _lengths_wanted(values: Namespace) -> int:
+    """Return how many lengths are aimed at."""
+    return USUAL_LENGTHS if values.count is None else int(values.count)
+
+
+def _of_lengths(before: Grid, found: Families, values: Namespace, off_scan: OffScan) -> Told:
+    """Return the figures of lengths, the same in words, and what draws them."""
+    from ..export.drawing.families import encode_families
+    from ..layouts.families import family_report
+
+    figures = family_report(before, found, values.tolerance)
+    return figures, _words(figures), lambda: encode_families(before, values.tolerance, off_scan=off_scan)
+
+
+def _of_kinds(before: Grid, found: PartKinds, values: Namespace, off_scan: OffScan) -> Told:
+    """Return the figures of joints or panels, the same in words, and what draws them."""
+    from ..export.drawing.families import encode_kinds
+    from ..layouts.alike import kinds_report, trade_of
+
+    figures = kinds_report(before, found, values.tolerance)
+    if values.report is not None or values.plot is not None:
+        figures["trade"] = trade_of(before, found, off_scan)
+    words = _words_of_kinds(figures, values.parts)
+    far = 0.0 if off_scan is None else off_scan(found.grid) / float(before.lengths.mean())
+    if far > WARNED_OFF_SCAN:
+        words.append(
+            f"warning: a node is {far:.2g} members off the scan; more kinds, by --count, keep nodes nearer: see the trade of --report"
+        )
+    return figures, words, lambda: encode_kinds(figures["trade"], values.parts)
 
 
 def _words(figures: dict[str, Any]) -> list[str]:
@@ -190,12 +244,13 @@ def _words(figures: dict[str, Any]) -> list[str]:
     return lines
 
 
-def _words_of_joints(figures: dict[str, Any]) -> list[str]:
-    """Return what has come out of joints in words."""
+def _words_of_kinds(figures: dict[str, Any], parts: str) -> list[str]:
+    """Return what has come out of joints or panels in words."""
+    counted = "nodes" if parts == JOINTS else "panels"
     kinds = figures["kinds"]
     return [
-        f"{figures['kinds_before']} kinds of joints before, {len(kinds)} after, of {sum(each['nodes'] for each in kinds)} joints,"
-        f" within {100 * figures['tolerance']:g} %",
+        f"{figures['kinds_before']} kinds of {parts} before, {len(kinds)} after, of {sum(each[counted] for each in kinds)} {parts},"
+        f" within {100 * figures['tolerance']:g} %{', mirror images alike' if figures['mirror_images_alike'] else ''}",
         f"the largest misfit is {100 * figures['misfit_max']:.3g} %, nodes moved by {figures['moved_max']:.2g} members at most,"
         f" lengths vary by {100 * figures['length_cv']:.3g} %",
     ]

@@ -16,7 +16,7 @@ from ..grid.panels import triangles_of
 from .charts import Charts, shortened
 from .images import Images
 
-FAMILY_ROUNDS = 300  #: of assignment and relaxation, each way
+FAMILY_ROUNDS = 300  #: of assignment and relaxation, each way but the last, which takes three times as many
 INNER_SHARE = 0.9  #: of the tolerance, within which a length is taken to be that of its family
 BISECTIONS = 60  #: of the least misfit
 STIFFNESS_OF_PLACE = 0.02  #: weight of staying where one is, over that of a length
@@ -182,6 +182,8 @@ class _Way(NamedTuple):
     rounds: int  #: after which weights begin anew
     one_by_one: bool  #: whether the number of families falls by one at a time
     onwards: bool = False  #: whether it begins at the best places so far
+    inner: float = INNER_SHARE  #: of the tolerance, within which a length is taken to be that of its family
+    total: int = FAMILY_ROUNDS  #: rounds
 
 
 WAYS_TRIED = (
@@ -189,6 +191,7 @@ WAYS_TRIED = (
     _Way(1.1, 30, False),
     _Way(1.2, 30, True, True),
     _Way(1.05, 60, True),
+    _Way(1.1, 30, False, inner=0.6, total=3 * FAMILY_ROUNDS),
 )  #: tried in turn
 
 
@@ -208,7 +211,7 @@ def _relaxed(
     best, least, since = place, math.inf, 0
     weight = np.full(len(lengths), LEAST_WEIGHT)
     now = _fewer(lengths, width, aim) if way.one_by_one else aim
-    for _ in range(FAMILY_ROUNDS):
+    for _ in range(way.total):
         if (missed := _missed(lengths, width, aim)) < least:
             best, least = place, missed
         if missed == 0:
@@ -225,7 +228,7 @@ def _relaxed(
             np.minimum(np.maximum(weight, 1) * way.heavier, MOST_WEIGHT),
             np.maximum(weight / way.heavier, LEAST_WEIGHT),
         )
-        pull = np.sign(off) * np.maximum(np.abs(off) - INNER_SHARE * width, 0)
+        pull = np.sign(off) * np.maximum(np.abs(off) - way.inner * width, 0)
         nodes = images.alike(charts.moved(_step(grid, charts, place, pull, weight)))
         place = charts.place_of(nodes)
         lengths = _lengths(nodes, grid.edges)
