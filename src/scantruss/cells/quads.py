@@ -24,7 +24,7 @@ from .quad_mesh import QuadMesh
 from .quad_search import Search, search_once
 from .row_lengths import row_lengths
 from .rows import Guide, RowStart, find_rows, lattice_places, offsets_of_edges, principal_directions, spread_rows
-from .stops import at_stops
+from .stops import at_stops, slide_back
 
 if TYPE_CHECKING:
     from ..boundary.find import Boundary
@@ -163,7 +163,9 @@ def _laid(
     used, quads = np.unique(quads, return_inverse=True)
     quads, chains = quads.reshape(-1, 4), np.searchsorted(used, chains)
     first = _grid(grid, nodes[used], quads, fixed[used], chains)
-    work = QuadMesh(opened(first), quads, chains)
+    mesh = opened(first)
+    slide_back(mesh, len(first.nodes))
+    work = QuadMesh(mesh, quads, chains)
     for _ in range(2):
         work.settle(FIRST_SWEEPS)
         work.renew(FIRST_NEAR)

@@ -19,7 +19,8 @@ from scipy.sparse.linalg import splu
 from ..improve.working_mesh import WorkingMesh
 from ..kernels.surface.local_surface import HEIGHTS, NORMAL, TANGENT
 from ..scan.vectors import dots
-from .fine_mesh import AT_REST_THERE, FineMesh
+from .fine_mesh import ALONG, AT_REST_THERE, FineMesh
+from .stops import ways_along
 
 DIRECTION_TURNS = 30  # most turns of diffusion and normalization of the directions
 LATTICE_TURNS = 30  # the same of the lattice
@@ -252,6 +253,9 @@ def offsets_of_edges(mesh: FineMesh, rows: LatticeRows) -> np.ndarray:
 
 
 def lattice_places(mesh: FineMesh, rows: LatticeRows) -> np.ndarray:
-    """Return the place of the lattice node nearest to each node of the fine mesh (F, 3)."""
+    """Return the place of the lattice node nearest to each node of the fine mesh (F, 3), for those of chains as near on the chain."""
     offset = rows.offset * mesh.length[:, None]
-    return mesh.nodes + offset[:, :1] * rows.along + offset[:, 1:] * rows.across
+    way = offset[:, :1] * rows.along + offset[:, 1:] * rows.across
+    slides, run = mesh.held == ALONG, ways_along(mesh.nodes, mesh.chains)
+    way[slides] = dots(way[slides], run[slides])[:, None] * run[slides]
+    return mesh.nodes + way
