@@ -17,7 +17,9 @@ if TYPE_CHECKING:
     from ..grid.grid import Grid
 
 WARN_ASIDE = 0.25  # distance between the boundaries of grid and scan above which it is poor [member lengths]
-WARN_CUT = 0.15  # distance of a corner of the boundary from the nearest node of it above which it is cut off [member lengths]
+WARN_CUT = (
+    0.15  # distance of a corner of the boundary from the nearest node of it above which it is cut off [member lengths]
+)
 
 
 def places_aside(grid: Grid, boundary: Boundary, length: float) -> list[Fault]:
