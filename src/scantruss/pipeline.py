@@ -183,7 +183,7 @@ def first_that_passes(
         of a grid of the mean surface that only leaves out too much.
     """
     faults: list[ScanTrussError] = []
-    limit, advice = limit or AttemptLimit(settings.cells), ""
+    limit, advice = limit or AttemptLimit(), ""
     for attempt in tried:
         if not limit.allows(attempt):
             continue
@@ -222,6 +222,7 @@ def make_grid_with_most_ridges(
         try:
             return with_ridges_given_up(make_grid(cloud, later, progress=progress), later.faults)
         except FrontError as error:
+            limit.end(error)
             first, later = first or error, later.after(error)
     assert first is not None
     raise first
