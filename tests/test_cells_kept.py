@@ -149,6 +149,10 @@ def test_a_corner_between_two_nodes_of_the_boundary_stays() -> None:
     assert Moves(mesh).collapse(last, 0) is None
     mesh.held[15], mesh.held[[2, 16]] = ALONG, AT_REST_THERE
     assert Moves(mesh).collapse(last, 0) is None
+    mesh.held[[2, 16]] = ALONG
+    assert Moves(mesh).collapse(last, 0) is not None
+    mesh.nodes[15, 1] = -0.3  # a tip of the boundary
+    assert Moves(mesh).collapse(last, 0) is None
 
 
 def test_a_node_between_a_triangle_and_a_quad_goes() -> None:

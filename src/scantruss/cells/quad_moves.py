@@ -13,6 +13,9 @@ from .quad_mesh import QuadMesh
 WORST_PENALTY = 2  # growth of the sum of squared irregularities up to which a move is tried
 MOST_QUADS = 7  # most quads at a node after a collapse
 FEWEST_QUADS = 3  # fewest quads at a node inside
+LEAST_STRAIGHT = (
+    0.95  # distance of two nodes of the boundary over the way along it, below which the bend between them stays
+)
 NO_PAIR = (-1, -1)  # of a move that neither merges nor splits nodes
 
 
@@ -117,6 +120,9 @@ class Moves:
         ):
             return None
         if not self.is_chain(a, between) or not self.is_chain(c, between):
+            return None
+        before, after = mesh.nodes[between] - mesh.nodes[a], mesh.nodes[c] - mesh.nodes[between]
+        if np.linalg.norm(before + after) < LEAST_STRAIGHT * (np.linalg.norm(before) + np.linalg.norm(after)):
             return None
         if len(mesh.at[across]) <= (1 if self.at_boundary[across] else FEWEST_QUADS):
             return None
