@@ -1,5 +1,6 @@
 """What quads and hexagons keep, as triangles do: fixed nodes, fixed lines, ridges and length fields; and panels that are no panels."""
 
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -9,8 +10,10 @@ from test_quads import bowl
 
 import scantruss as st
 from scantruss.cells.collapse import LatticeMesh
+from scantruss.cells.fine_mesh import ALONG, AT_REST_THERE, FREE
 from scantruss.cells.hexagons import dual_of
 from scantruss.cells.lead import Panels
+from scantruss.cells.quad_moves import Moves
 from scantruss.cells.row_lengths import row_lengths
 from scantruss.constraints.network import curves_of
 from scantruss.grid.grid import Grid
@@ -106,6 +109,50 @@ def test_a_hollow_panel_has_an_angle_above_180() -> None:
     nodes = np.array([(0, 0, 0), (2, 0, 0), (0.5, 0.5, 0), (0, 2, 0.0)], float)
     angles = inner_angles_of(nodes, table_of([[0, 1, 2, 3]]))
     assert angles.sum() == pytest.approx(360.0) and angles[0, 2] > 180.0 > angles[0, [0, 1, 3]].max()
+
+
+def plate_with_a_panel_too_many() -> tuple[Any, int]:
+    """Two rows of four squares; a node of the boundary is three, with a panel of their own between them and the node above."""
+    places = [(x, y) for y in (0.0, 1.0, 2.0) for x in (0.0, 1.0, 2.0, 3.0, 4.0)] + [(2.2, 0.0), (2.4, 0.0)]
+    quads = [[5 * j + i, 5 * j + i + 1, 5 * j + i + 6, 5 * j + i + 5] for j in (0, 1) for i in range(4)]
+    quads[2][0] = 16
+    quads.append([2, 15, 16, 7])
+    around = [0, 1, 2, 15, 16, 3, 4, 9, 14, 13, 12, 11, 10, 5]
+    mesh = SimpleNamespace(
+        nodes=np.array([(x, y, 0.0) for x, y in places]),
+        quads=quads,
+        at=[{q for q, ring in enumerate(quads) if v in ring} for v in range(17)],
+        held=np.where(np.isin(np.arange(17), [0, 4, 10, 14]), AT_REST_THERE, np.where(np.isin(np.arange(17), around), ALONG, FREE)),
+        chains={(min(a, b), max(a, b)) for a, b in zip(around, [*around[1:], 0], strict=True)},
+        free=[],
+        live=lambda: np.array(quads),
+    )  # fmt: skip
+    return mesh, len(quads) - 1
+
+
+def test_a_panel_with_a_node_of_the_boundary_to_itself_goes_with_that_node() -> None:
+    mesh, last = plate_with_a_panel_too_many()
+    move = Moves(mesh).collapse(last, 0)
+    assert move is not None and move.pair == (2, 16) and move.growth == -1
+    rings = {**dict(enumerate(mesh.quads)), **move.quads}
+    assert [ring for ring in rings.values() if ring] == [
+        [5 * j + i, 5 * j + i + 1, 5 * j + i + 6, 5 * j + i + 5] for j in (0, 1) for i in range(4)
+    ]
+    around = [0, 1, 2, 3, 4, 9, 14, 13, 12, 11, 10, 5]
+    chain = {(min(a, b), max(a, b)) for a, b in zip(around, [*around[1:], 0], strict=True)}
+    assert (mesh.chains - move.cut) | move.tied == chain
+
+
+def test_a_corner_between_two_nodes_of_the_boundary_stays() -> None:
+    mesh, last = plate_with_a_panel_too_many()
+    mesh.held[15] = AT_REST_THERE
+    assert Moves(mesh).collapse(last, 0) is None
+    mesh.held[15], mesh.held[[2, 16]] = ALONG, AT_REST_THERE
+    assert Moves(mesh).collapse(last, 0) is None
+    mesh.held[[2, 16]] = ALONG
+    assert Moves(mesh).collapse(last, 0) is not None
+    mesh.nodes[15, 1] = -0.3  # a tip of the boundary
+    assert Moves(mesh).collapse(last, 0) is None
 
 
 def test_a_node_between_a_triangle_and_a_quad_goes() -> None:

@@ -12,7 +12,8 @@ from steps import steps_of
 from typed import known
 
 import scantruss as st
-from scantruss.boundary.find import Boundary
+from scantruss.boundary.find import Boundary, Loop
+from scantruss.check.boundaries import places_aside
 from scantruss.check.certify import certified, certify
 from scantruss.check.doubtful import doubtful_places, zigzags
 from scantruss.check.gaps import bridged_gaps
@@ -166,6 +167,56 @@ def test_what_is_rounded_off_by_a_quarter_of_a_member_is_a_warning() -> None:
     points[:, 2] *= 0.6
     samples, grid = scanned(points, lattice())
     assert "rounded" not in {warning.kind for warning in certify(grid, samples, NOTHING, SETTINGS).warnings}
+
+
+def bounded(grid: st.Grid) -> Boundary:
+    """The boundary of a rhombus, with a point every twentieth of a member and a corner at each of its own."""
+    (ring,) = grid.boundary_loops
+    shares = np.linspace(0.0, 1.0, 20, endpoint=False)[:, None, None]
+    nodes = grid.nodes[ring]
+    points = ((1.0 - shares) * nodes + shares * np.roll(nodes, -1, axis=0)).transpose(1, 0, 2).reshape(-1, 3)
+    before, after = nodes - np.roll(nodes, 1, axis=0), np.roll(nodes, -1, axis=0) - nodes
+    corner_at = 20 * np.flatnonzero((before * after).sum(axis=1) < 0.9)
+    assert len(corner_at) == 4
+    return Boundary((Loop(points, corner_at, external=True, length=float(len(ring)), piece=0),))
+
+
+def test_a_boundary_that_leaves_the_scans_is_a_warning_with_its_places() -> None:
+    grid = lattice()
+    boundary = bounded(grid)
+    assert not places_aside(grid, boundary, 1.0)
+    (ring,) = grid.boundary_loops
+    corner_nodes = [int(v) for v in ring if (np.linalg.norm(boundary.corners - grid.nodes[v], axis=1) < 1e-9).any()]
+    v = next(int(v) for v in ring if np.linalg.norm(grid.nodes[corner_nodes] - grid.nodes[v], axis=1).min() > 2.0)
+    inward = -grid.nodes[v] / np.linalg.norm(grid.nodes[v])
+    for way in (0.4 * inward, -0.4 * inward, [0.0, 0.0, 0.4]):
+        nodes = grid.nodes.copy()
+        nodes[v] += way
+        (warning,) = places_aside(grid.replace(nodes=nodes), boundary, 1.0)
+        off = float(warning.words.removeprefix("leaves the boundary of the scan by ").split()[0])
+        assert warning.kind == "aside" and 0.3 <= off <= 0.4 and not warning.also
+        assert np.linalg.norm(np.array(warning.where) - grid.nodes[v]) < 0.5
+
+
+def test_a_corner_that_is_cut_off_is_a_warning_with_its_place() -> None:
+    grid = lattice()
+    boundary = bounded(grid)
+    (ring,) = grid.boundary_loops
+    sharp = next(int(v) for v in ring if (grid.triangles == v).sum() == 1)
+    cut = grid.replace(triangles=grid.triangles[~(grid.triangles == sharp).any(axis=1)])
+    found = {warning.kind: warning for warning in places_aside(cut, boundary, 1.0)}
+    assert found.keys() == {"aside", "cut"}
+    for warning in found.values():
+        assert warning.where == pytest.approx(tuple(grid.nodes[sharp]))
+    assert found["cut"].words == "cuts off a corner of the boundary by 1.00 members"
+    assert found["aside"].words == f"leaves the boundary of the scan by {0.75**0.5:.2f} members"
+    samples, same = scanned(sheet(13, 8, 0.08), grid)
+    moved = Boundary(tuple(replace(loop, points=loop.points - same.origin) for loop in boundary.loops))
+    kinds = [
+        warning.kind
+        for warning in certify(cut.replace(nodes=same.nodes, origin=same.origin), samples, moved, SETTINGS).warnings
+    ]
+    assert {"aside", "cut"} <= set(kinds)
 
 
 def test_a_refusal_names_the_setting_that_accepts_it_only_where_that_is_enough(monkeypatch: pytest.MonkeyPatch) -> None:

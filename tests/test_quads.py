@@ -87,6 +87,27 @@ def test_corners_are_nodes_and_the_boundary_is_kept() -> None:
     assert np.minimum(np.abs(np.abs(loop[:, 0]) - 8.0), np.abs(np.abs(loop[:, 1]) - 6.0)).max() < 0.06 * LENGTH
 
 
+@compiled_only
+@pytest.mark.parametrize("degrees", [30.0, 45.0])
+def test_rows_along_the_curvature_end_at_the_boundary_at_any_angle(degrees: float) -> None:
+    """A trough askew to its square plan: the rows along it meet the sides at an angle; nodes are on the sides, and at the corners."""
+    rng, sides = np.random.default_rng(3), np.linspace(-6.0, 6.0, 240)
+    side = np.column_stack([sides, np.full(240, 6.0)])
+    plan = np.concatenate([rng.uniform(-6.0, 6.0, (14_000, 2)), side, -side, side[:, ::-1], -side[:, ::-1]])
+    across = plan @ [np.cos(np.radians(degrees)), np.sin(np.radians(degrees))]
+    settings = st.Settings(length=1.3, cells="quad", rows="curvature", effort="quick")
+    grid = st.grid_from_points(np.column_stack([plan, 4.0 - 0.05 * across**2]), settings)
+    assert grid.certificate is not None and not grid.certificate.warnings
+    (loop,), nodes = grid.boundary_loops, grid.scan_nodes[:, :2]
+    assert np.abs(np.abs(nodes[loop]).max(axis=1) - 6.0).max() < 0.01 * settings.length
+    around, corners = (
+        nodes[loop] - np.roll(nodes[loop], 1, axis=0),
+        6.0 * np.array([[-1, -1], [-1, 1], [1, -1], [1, 1]]),
+    )
+    assert np.abs(around).sum() == pytest.approx(48.0, rel=0.01)  # once around, never back
+    assert np.linalg.norm(nodes[:, None] - corners, axis=2).min(axis=0).max() < 0.01 * settings.length
+
+
 def test_the_same_scan_gives_the_same_bytes_and_json_holds_all(tmp_path: Path) -> None:
     again = st.grid_from_points(bowl(False), st.Settings(length=LENGTH, cells="quad", unit="m"))
     text = encode_json(quads())

@@ -91,8 +91,9 @@ def test_a_hole_beside_the_plane_is_refused_and_not_mirrored() -> None:
 
 @compiled_only
 @pytest.mark.parametrize("lean", [0.0, 12.0])
-def test_the_grid_is_its_own_image_to_rounding(lean: float) -> None:
-    settings = st.Settings(length=LENGTH, symmetry="auto", effort="quick")
+@pytest.mark.parametrize("cells", ["triangle", "quad"])
+def test_the_grid_is_its_own_image_to_rounding(lean: float, cells: str) -> None:
+    settings = st.Settings(length=LENGTH, symmetry="auto", effort="quick", cells=cells)
     grid = st.grid_from_points(vault(0.3, lean=lean), settings)
     assert grid.certificate is not None and grid.certificate.passed and grid.settings is not None
     rows = grid.settings.symmetry
@@ -104,14 +105,22 @@ def test_the_grid_is_its_own_image_to_rounding(lean: float) -> None:
         apart, image = cKDTree(grid.nodes).query(reflected(grid, tuple(row)))
         assert apart.max() < exact and np.array_equal(image[image], np.arange(len(image)))
         assert {frozenset(image[list(pair)].tolist()) for pair in members} == members
+        panels = {frozenset(panel) for panel in grid.panel_loops}
+        assert {frozenset(image[list(panel)].tolist()) for panel in panels} == panels
         on = np.flatnonzero(image == np.arange(len(image)))
         assert sum(pair <= set(on.tolist()) for pair in members) >= len(on) - 1 >= 4  # rows of members on the plane
     distinct = len(np.unique(np.round(grid.lengths, 9)))
     assert distinct < (0.4 if lean == 0 else 0.65) * len(grid.lengths)
     made = st.schedule(grid.replace(unit="m"), st.ScheduleSettings(tube=100.0))
-    assert None not in made.panel_types["mirror image"] and None not in made.node_types["mirror image"]
+    assert None not in made.node_types["mirror image"]
+    assert cells == "quad" or None not in made.panel_types["mirror image"]
     again = st.grid_from_points(vault(0.3, lean=lean), grid.settings)
     assert np.array_equal(again.nodes, grid.nodes) and np.array_equal(again.triangles, grid.triangles)
+
+
+def test_hexagons_are_not_made_symmetric() -> None:
+    with pytest.raises(InputError, match="symmetry needs cells triangle or quad, got hexagon"):
+        st.Settings(length=LENGTH, symmetry="auto", cells="hexagon")
 
 
 def test_a_fixed_line_without_its_image_is_refused() -> None:
@@ -198,8 +207,10 @@ def test_turning_about_an_axis_keeps_it_and_adds_up() -> None:
 
 
 @compiled_only
-def test_the_grid_of_a_pinwheel_is_itself_when_turned() -> None:
-    grid = st.grid_from_points(pinwheel(), st.Settings(length=12.0, symmetry="auto", effort="quick"))
+@pytest.mark.parametrize("cells", ["triangle", "quad"])
+def test_the_grid_of_a_pinwheel_is_itself_when_turned(cells: str) -> None:
+    grid = st.grid_from_points(pinwheel(), st.Settings(length=12.0, symmetry="auto", effort="quick", cells=cells))
+    assert grid.cells == cells and grid.topology.manifold and grid.topology.orientable
     assert grid.certificate is not None and grid.certificate.passed and grid.settings is not None
     assert not isinstance(grid.settings.symmetry, str)
     (row,) = grid.settings.symmetry

@@ -36,7 +36,7 @@ FAR_FROM_PASSING = 12  # cuts and missing boundary loops above which other front
 # share of the scan that a grid misses above which the same holds, in shares that may be missing; of thin limbs 1
 FAR_MISSING = 2.0
 MOST_RUNS = 24  # grids that are made at most, before a scan is refused
-MOST_RUNS_OF_CELLS = 3  # the same for quads and hexagons, which are made of triangles that pass
+MOST_RUNS_OF_CELLS = 3  # the same of quads or hexagons, which are made of triangles that pass
 MOST_FAR, MOST_GIVEN_UP = 2, 3  # attempts in a row of the same settings that are so far from passing, and such settings
 
 
@@ -205,28 +205,35 @@ class AttemptLimit:
     counted in grids that are made, not in seconds: the same scan gets the same result.
     """
 
-    def __init__(self, cells: str = "triangle") -> None:
-        self._most = MOST_RUNS if cells == "triangle" else min(MOST_RUNS, MOST_RUNS_OF_CELLS)
-        self._allowed = self._most
+    def __init__(self) -> None:
+        self._allowed = MOST_RUNS
         self._far: list[tuple[Settings, int]] = []  # settings, and how many attempts in a row were far from passing
-        self._given_up = 0
+        self._given_up = self._of_cells = 0
         self.runs, self._looks_one_sided = 0, False  #: grids that were made
 
     def allow(self, more: int) -> None:
         """Pause after some more grids."""
-        self._allowed = min(self._most, self.runs + more)
+        self._allowed = min(MOST_RUNS, self.runs + more)
 
     def any_left(self) -> bool:
         """Whether any attempt is worth making, and allowed."""
-        return self._given_up < MOST_GIVEN_UP and self.runs < self._allowed
+        return self._is_hopeful() and self.runs < self._allowed
 
     def is_paused(self) -> bool:
         """Whether attempts would be worth making that are not allowed."""
-        return self._given_up < MOST_GIVEN_UP and self._allowed <= self.runs < self._most
+        return self._is_hopeful() and self._allowed <= self.runs < MOST_RUNS
+
+    def _is_hopeful(self) -> bool:
+        """Whether any attempt is worth making."""
+        return self._given_up < MOST_GIVEN_UP and self._of_cells < MOST_RUNS_OF_CELLS
 
     def begin(self) -> None:
         """Note that a grid is made."""
         self.runs += 1
+
+    def end(self, fault: FrontError) -> None:
+        """Note why a grid that was made does not pass."""
+        self._of_cells += fault.grid is not None and fault.grid.cells != "triangle"
 
     def allows(self, attempt: Attempt) -> bool:
         """Whether an attempt is worth making."""

@@ -11,8 +11,7 @@ import numpy as np
 from .attempts import Attempt, AttemptLimit, attempts, only_leaves_out
 from .boundary.find import find_boundary
 from .candidates import advance_fronts, best_that_passes, improve_fronts
-from .cells.make import settings_of_triangles, with_cells
-from .check.certify import certified
+from .cells.make import certified_cells, settings_of_triangles, with_cells
 from .check.limits import with_ridges_given_up
 from .constraints.find import find_constraints
 from .errors import CertificateError, FrontError, OneSidedError, ScanTrussError
@@ -133,7 +132,8 @@ def symmetric_grid(
     symmetry = find_symmetry(np.asarray(cloud.points) + cloud.origin, settings)
     plain = settings.replace(symmetry="")
     refused: FrontError | None = None
-    for lines in symmetry.edges(grid_from_cloud(cloud, plain, progress=progress), settings.length):
+    surface = grid_from_cloud(cloud, plain.replace(cells="triangle", rows="boundary", planar=False), progress=progress)
+    for lines in symmetry.edges(surface, settings.length):
         names = plain.line_names or [f"line {number}" for number in range(1, len(plain.fixed_lines) + 1)]
         lined = plain.replace(
             fixed_lines=[*plain.fixed_lines, *(line.tolist() for line in lines)],
@@ -147,7 +147,7 @@ def symmetric_grid(
             try:
                 made = symmetry.made(half, lines, settings.length, part)
                 check_boundary_kept(made, boundary, settings.length)
-                return certified(made.replace(settings=kept), samples, boundary, own)
+                return certified_cells(made.replace(settings=kept), samples, boundary, own)
             except FrontError as error:
                 refused = refused or error
     assert refused is not None
@@ -183,7 +183,7 @@ def first_that_passes(
         of a grid of the mean surface that only leaves out too much.
     """
     faults: list[ScanTrussError] = []
-    limit, advice = limit or AttemptLimit(settings.cells), ""
+    limit, advice = limit or AttemptLimit(), ""
     for attempt in tried:
         if not limit.allows(attempt):
             continue
@@ -222,6 +222,7 @@ def make_grid_with_most_ridges(
         try:
             return with_ridges_given_up(make_grid(cloud, later, progress=progress), later.faults)
         except FrontError as error:
+            limit.end(error)
             first, later = first or error, later.after(error, cloud)
     assert first is not None
     raise first

@@ -95,9 +95,8 @@ def _judged(
     made: Grid, samples: SurfaceSamples, boundary: Boundary, constraints: Constraints, settings: Settings
 ) -> Grid:
     """Return a grid of cells, made planar if that is wanted, with its certificate."""
-    judged = judging_settings(settings)
     if not settings.planar:
-        return certified(made.replace(settings=settings), samples, boundary, judged)
+        return certified_cells(made.replace(settings=settings), samples, boundary, settings)
     from .planar import make_planar  # needs scipy, which other grids do not load
     from .stops import at_stops
 
@@ -108,8 +107,19 @@ def _judged(
     mesh = WorkingMesh.from_grid(made, surface, boundary.curves, boundary.stops, length, lines)
     flat = make_planar(mesh, made)
     flat = flat.replace(deviation=mesh.deviation()[: len(made.nodes)].copy(), desired=made.desired, before=made.quality)
-    found = certified(flat.replace(settings=settings), samples, boundary, judged)
-    return with_warning_of_planes(found)
+    return certified_cells(flat.replace(settings=settings), samples, boundary, settings)
+
+
+def certified_cells(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings: Settings) -> Grid:
+    """Return a grid of any cells with its certificate, and the warning of panels that should be planar and are not.
+
+    Raises
+    ------
+    CertificateError
+        It does not pass.
+    """
+    found = certified(grid, samples, boundary, judging_settings(settings))
+    return with_warning_of_planes(found) if settings.planar else found
 
 
 def with_warning_of_planes(grid: Grid) -> Grid:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Set
 
 import numpy as np
 
@@ -51,7 +51,7 @@ class QuadMesh:
         )  # fmt: skip
         self._enter(range(count))
         self.around = np.empty(NODES_AROUND, np.int64), np.empty((NODES_AROUND, 4))
-        self.chains = {tuple(sorted(pair)) for pair in chains.tolist()}
+        self.chains: set[tuple[int, int]] = {(min(a, b), max(a, b)) for a, b in chains.tolist()}
 
     def live(self) -> np.ndarray:
         """Return the quads that are there (Q, 4)."""
@@ -175,6 +175,11 @@ class QuadMesh:
                 changed.add(v)
         self._enter(changed)
         return old, fresh
+
+    def tie(self, cut: Set[tuple[int, int]], tied: Set[tuple[int, int]]) -> None:
+        """Take members from the boundary and lines, and give others to them, the smaller node first."""
+        self.chains -= cut
+        self.chains |= tied
 
     def add_node(self, beside: int, fresh: int, new: dict[int, list[int]]) -> None:
         """Put a new node near another, on the way to the others of its quads, which are among the corners that change."""

@@ -7,12 +7,15 @@ from typing import NamedTuple
 import numpy as np
 
 from ..grid.panels import corner_angles_of
-from .fine_mesh import AT_REST_THERE, FREE
+from .fine_mesh import ALONG, AT_REST_THERE, FREE
 from .quad_mesh import QuadMesh
 
 WORST_PENALTY = 2  # growth of the sum of squared irregularities up to which a move is tried
 MOST_QUADS = 7  # most quads at a node after a collapse
 FEWEST_QUADS = 3  # fewest quads at a node inside
+LEAST_STRAIGHT = (
+    0.95  # distance of two nodes of the boundary over the way along it, below which the bend between them stays
+)
 NO_PAIR = (-1, -1)  # of a move that neither merges nor splits nodes
 
 
@@ -24,6 +27,8 @@ class Move(NamedTuple):
     quads: dict[int, list[int]]  #: new corners of quads, none of one that goes; -1 is a new quad
     growth: int  #: quads more
     pair: tuple[int, int] = NO_PAIR  #: the node that stays and the one that goes or comes
+    cut: frozenset[tuple[int, int]] = frozenset()  #: members of chains that go, the smaller node first
+    tied: frozenset[tuple[int, int]] = frozenset()  #: those that come
 
 
 class Moves:
@@ -88,7 +93,7 @@ class Moves:
         if mesh.held[c] > mesh.held[a] or (self.at_boundary[c] and not self.at_boundary[a]):
             a, b, c, d = c, d, a, b
         if mesh.held[c] != FREE:
-            return None
+            return self._merge_along(q, [a, b, c, d])
         if any(len(mesh.at[v]) <= (1 if self.at_boundary[v] else FEWEST_QUADS) for v in (b, d)):
             return None
         quads = len(mesh.at[a]) + len(mesh.at[c]) - 2
@@ -102,6 +107,36 @@ class Moves:
             return None
         changes = {p: [a if v == c else v for v in mesh.quads[p]] for p in sorted(mesh.at[c]) if p != q}
         return Move("collapse", frozenset((a, b, c, d)), {**changes, q: []}, -1, (a, c))
+
+    def _merge_along(self, q: int, corners: list[int]) -> Move | None:
+        """Merge two nodes of the boundary, of which the second slides, that have a node of one quad between them, which goes."""
+        mesh = self.mesh
+        a, b, c, d = corners
+        if self.at_boundary[b] and len(mesh.at[b]) == 1:
+            b, d = d, b
+        between, across = d, b
+        if not (
+            self.at_boundary[between] and len(mesh.at[between]) == 1 and mesh.held[between] == mesh.held[c] == ALONG
+        ):
+            return None
+        if not self.is_chain(a, between) or not self.is_chain(c, between):
+            return None
+        before, after = mesh.nodes[between] - mesh.nodes[a], mesh.nodes[c] - mesh.nodes[between]
+        if np.linalg.norm(before + after) < LEAST_STRAIGHT * (np.linalg.norm(before) + np.linalg.norm(after)):
+            return None
+        if len(mesh.at[across]) <= (1 if self.at_boundary[across] else FEWEST_QUADS):
+            return None
+        quads = len(mesh.at[a]) + len(mesh.at[c]) - 2
+        penalty = (quads - self.ideals[a]) ** 2 + self.grows(across, -1)
+        penalty -= self.charge(a) + self.charge(c) + self.charge(between)
+        around = [{v for p in mesh.at[end] - {q} for v in mesh.quads[p]} for end in (a, c)]
+        if not 0 < quads <= MOST_QUADS or penalty > WORST_PENALTY or around[0] & around[1] - {across}:
+            return None
+        changes = {p: [a if v == c else v for v in mesh.quads[p]] for p in sorted(mesh.at[c]) if p != q}
+        cut = frozenset(pair for pair in mesh.chains if c in pair or between in pair)
+        ends = [v for pair in cut if c in pair for v in pair if v not in (c, between)]
+        tied = frozenset((min(a, v), max(a, v)) for v in ends)
+        return Move("collapse", frozenset(corners), {**changes, q: []}, -1, (a, c), cut, tied)
 
     def turn(self, a: int, b: int, way: int) -> Move | None:
         """Turn the member between two nodes in the six corners around it, one way (1) or the other (2)."""

@@ -56,6 +56,7 @@ class Search:
             return None
         places, was = mesh.around[0][:count].copy(), mesh.around[1][:count].copy()
         old, fresh = mesh.change(move.quads)
+        mesh.tie(move.cut, move.tied)
         if move.kind == "split":
             mesh.free.pop()
         elif move.kind == "collapse":
@@ -66,6 +67,7 @@ class Search:
         """Take the last move back."""
         mesh = self.mesh
         mesh.change(made.quads)
+        mesh.tie(made.move.tied, made.move.cut)
         del mesh.quads[len(mesh.quads) - len(made.fresh) :]
         if made.move.kind == "split":
             mesh.free.append(made.move.pair[1])

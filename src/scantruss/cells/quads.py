@@ -24,7 +24,7 @@ from .quad_mesh import QuadMesh
 from .quad_search import Search, search_once
 from .row_lengths import row_lengths
 from .rows import Guide, RowStart, find_rows, lattice_places, offsets_of_edges, principal_directions, spread_rows
-from .stops import at_stops
+from .stops import at_stops, slide_back
 
 if TYPE_CHECKING:
     from ..boundary.find import Boundary
@@ -47,9 +47,10 @@ ROW_STARTS = (
 STARTS_TRIED = {"quick": 1, "normal": 4, "best": 10}  # of them, for each effort
 LEFT_BEFORE_ROUND = {"quick": (1,), "normal": (3, 1), "best": (10, 5, 2)}  # starts that are searched in each round
 MOST_ROUNDS = {"quick": 2, "normal": 6, "best": 12}  # of the search
+LITTLE_LEFT = 0.01  # mean energy of a quad below which no other start can be much better
 LEAST_FALL = 0.01  # share of the energy that a round must gain for another to follow
 PARTS = 3  # pieces that a member of the triangles becomes in the fine mesh
-FIRST_SWEEPS, LAST_SWEEPS_OF_QUADS = 60, 60  # most sweeps before the search and in the end
+FIRST_SWEEPS, LAST_SWEEPS_OF_QUADS = 25, 60  # most sweeps before the search and in the end
 FIRST_NEAR, LAST_NEAR = 0.4, 0.2  # distance of a node from the centre of its patch that gets it a new one [members]
 
 
@@ -102,6 +103,8 @@ def quads_of(
         first, work = _laid(grid, on[0], on[1], start, guide, opened)
         before = work.grid(first).quality
         tried.append(_Tried(work.mean_energy(), number, first, work, before))
+        if tried[-1].energy < LITTLE_LEFT:
+            break
     _, _, first, work, before = _best_of(tried, settings.effort, report)
     work.renew(LAST_NEAR)
     work.settle(LAST_SWEEPS_OF_QUADS)
@@ -163,7 +166,9 @@ def _laid(
     used, quads = np.unique(quads, return_inverse=True)
     quads, chains = quads.reshape(-1, 4), np.searchsorted(used, chains)
     first = _grid(grid, nodes[used], quads, fixed[used], chains)
-    work = QuadMesh(opened(first), quads, chains)
+    mesh = opened(first)
+    slide_back(mesh, len(first.nodes))
+    work = QuadMesh(mesh, quads, chains)
     for _ in range(2):
         work.settle(FIRST_SWEEPS)
         work.renew(FIRST_NEAR)

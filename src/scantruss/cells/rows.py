@@ -15,11 +15,13 @@ from typing import NamedTuple
 import numpy as np
 from scipy.sparse import coo_matrix, csc_matrix, identity
 from scipy.sparse.linalg import splu
+from scipy.spatial import cKDTree
 
 from ..improve.working_mesh import WorkingMesh
 from ..kernels.surface.local_surface import HEIGHTS, NORMAL, TANGENT
 from ..scan.vectors import dots
-from .fine_mesh import AT_REST_THERE, FineMesh
+from .fine_mesh import ALONG, AT_REST_THERE, FineMesh
+from .stops import ways_along
 
 DIRECTION_TURNS = 30  # most turns of diffusion and normalization of the directions
 LATTICE_TURNS = 30  # the same of the lattice
@@ -27,6 +29,9 @@ CURVATURE_WEIGHT = (
     20.0  # weight of a guide where the principal curvatures differ by one over a member, against one edge
 )
 HELD_WEIGHT = 30.0  # weight of what the boundary and lines ask of the lattice, against one edge
+ROWS_TURN_OVER = (
+    1.5  # way from the boundary and lines over which rows that follow them come to follow a guide [members]
+)
 LEAST_CHAIN_AGREEMENT = 0.5  # least agreement of the ways of chains at a node for it to tell a direction
 
 
@@ -65,7 +70,7 @@ def find_rows(mesh: FineMesh, start: RowStart, guide: Guide | None = None) -> La
     mesh : FineMesh
     start : RowStart
     guide : Guide, optional
-        Directions that the rows should follow inside.
+        Directions that the rows should follow away from the boundary and lines.
     """
     first, second = _frames(mesh.normals)
     i, j = mesh.edges.T
@@ -175,7 +180,9 @@ def _directions(
     strength = np.where((ends > 0) & (size > LEAST_CHAIN_AGREEMENT), 1e4, 0.0)
     if guide is not None:
         wanted = np.exp(4j * np.arctan2(dots(guide.direction, second), dots(guide.direction, first)))
-        aim, strength = wanted, guide.weight.copy()
+        led = strength > 0.0  # by the boundary or a line
+        share = np.minimum(_distances_from(mesh, led) / ROWS_TURN_OVER, 1.0)
+        aim, strength = np.where(led, aim, wanted), np.where(led, strength, share**2 * guide.weight)
     if not strength.any():
         aim[0], strength[0] = 1.0, 1e-3
     pull = csc_matrix((strength.astype(complex), (np.arange(count), np.arange(count))), shape=(count, count))
@@ -186,6 +193,14 @@ def _directions(
         unit = field / np.maximum(np.abs(field), 1e-300)
         field = solver.solve(strength * aim + rate * unit)
     return np.angle(field) / 4
+
+
+def _distances_from(mesh: FineMesh, some: np.ndarray) -> np.ndarray:
+    """Return the distance of each node from the nearest of some (F,) bool, in members (F,)."""
+    if not some.any():
+        return np.full(len(some), np.inf)
+    away: np.ndarray = cKDTree(mesh.nodes[some]).query(mesh.nodes)[0]
+    return away / mesh.length
 
 
 def _lattice(
@@ -252,6 +267,9 @@ def offsets_of_edges(mesh: FineMesh, rows: LatticeRows) -> np.ndarray:
 
 
 def lattice_places(mesh: FineMesh, rows: LatticeRows) -> np.ndarray:
-    """Return the place of the lattice node nearest to each node of the fine mesh (F, 3)."""
+    """Return the place of the lattice node nearest to each node of the fine mesh (F, 3), for those of chains as near on the chain."""
     offset = rows.offset * mesh.length[:, None]
-    return mesh.nodes + offset[:, :1] * rows.along + offset[:, 1:] * rows.across
+    way = offset[:, :1] * rows.along + offset[:, 1:] * rows.across
+    slides, run = mesh.held == ALONG, ways_along(mesh.nodes, mesh.chains)
+    way[slides] = dots(way[slides], run[slides])[:, None] * run[slides]
+    return mesh.nodes + way

@@ -15,6 +15,7 @@ from ..errors import CertificateError
 from ..grid.certificate import Certificate, Fault, LeftOut, Spread, Worst, place_of
 from ..runtime.parallel import side_by_side
 from ..surface.chosen_samples import KEPT, LIMB, SLIT
+from .boundaries import places_aside
 from .crossings import find_crossings
 from .defects import faults_in_space, faults_of_topology
 from .distances import Distances, measure_distances
@@ -65,12 +66,13 @@ def certify(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings: S
         return replace(_topology(grid, samples, boundary, settings), faults=(fault,))
     length = settings.length
     found = measure_distances(grid, samples, length)
-    nearest, cuts, certificate, (gaps, bridged), doubtful = side_by_side(
+    nearest, cuts, certificate, (gaps, bridged), doubtful, aside = side_by_side(
         lambda: nodes_of_samples(grid, samples, length),
         lambda: find_crossings(grid.nodes, grid.triangles, grid.origin),
         lambda: replace(_topology(grid, samples, boundary, settings), **_extremes(grid, settings)),
         lambda: bridged_gaps(grid, samples, boundary, length),
         lambda: [] if settings.boundary else doubtful_places(grid, samples, length),
+        lambda: places_aside(grid, boundary, length),
     )
     certificate = replace(certificate, crossings=len(cuts), **_apart(grid, samples, boundary, gaps, found, length))
     faults = [*faults_of_topology(grid, certificate, boundary), *faults_in_space(grid, certificate, cuts, settings)]
@@ -80,7 +82,8 @@ def certify(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings: S
     missed_at = place_of(samples.scan[_missed(grid, samples, found, length)] + samples.origin)
     rounded = _rounded(grid, samples, found, length)
     apart = cut_apart(grid, samples, found, length)
-    warnings = (*poor, *apart, *bridged, *doubtful, *places_to_look_at(certificate, missed_at, rounded))
+    places = places_to_look_at(certificate, missed_at, rounded)
+    warnings = (*poor, *apart, *bridged, *doubtful, *aside, *places)
     return replace(certificate, faults=tuple(faults), warnings=warnings, widened=widened_limits(settings))
 
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import FrontError
 from ..grid.grid import Grid
 from ..grid.line_sets import FIXED_LINE, LineSet
+from ..grid.panels import triangles_of
 from ..scan.rotation import turn_about
 
 if TYPE_CHECKING:
@@ -96,7 +97,7 @@ def mirror_lines(grid: Grid, planes: Sequence[MirrorPlane], length: float) -> li
 
 
 def mirrored_grid(grid: Grid, planes: Sequence[MirrorPlane], length: float) -> Grid:
-    """Return the grid of the part that is kept and its images, which share the nodes on the planes.
+    """Return the grid of the part that is kept and its images, of triangles or quads, which share the nodes on the planes.
 
     Raises
     ------
@@ -104,9 +105,9 @@ def mirrored_grid(grid: Grid, planes: Sequence[MirrorPlane], length: float) -> G
         The rows do not follow the planes: the part cannot be cut off along them.
     """
     wedge = wedge_of(planes, grid.origin)
-    middles = grid.nodes[grid.triangles].mean(axis=1)
+    middles = grid.nodes[grid.panel_table].mean(axis=1)
     inside = np.all([middles @ normal > offset for normal, offset in wedge.walls], axis=0)
-    kept = grid.triangles[inside]
+    kept = grid.panel_table[inside]
     if len(kept) == 0:
         raise FrontError("no grid lies on the side of the mirror planes that is kept; leave --symmetry out", grid)
     nodes, on = _on_walls(grid, inside, wedge, length)
@@ -168,16 +169,25 @@ def _united(
     places = nodes[source] - wedge.centre
     made = np.einsum("vij,vj->vi", np.array(matrices)[image_of], places) + wedge.centre
     made[image_of == 0] = nodes[source[image_of == 0]]
-    triangles = np.concatenate([number_of[k][kept if k % 2 == 0 else kept[:, [0, 2, 1]]] for k in range(len(matrices))])
-    return grid.replace(
-        nodes=made,
-        triangles=triangles,
+    back = [0, *range(kept.shape[1] - 1, 0, -1)]  # corners of a panel seen from the other side
+    panels = np.concatenate([number_of[k][kept if k % 2 == 0 else kept[:, back]] for k in range(len(matrices))])
+    return with_panels(
+        grid,
+        made,
+        panels,
         fixed=grid.fixed[source],
         lines=images_of_members(grid.lines, number_of),
         line_sets=images_of_lines(grid.line_sets, number_of),
         deviation=None if grid.deviation is None else grid.deviation[source],
         desired=None if grid.desired is None else grid.desired[source],
     )
+
+
+def with_panels(grid: Grid, nodes: np.ndarray, panels: np.ndarray, **others: Any) -> Grid:
+    """Return a grid with other nodes (V, 3), panels (P, 3) or quads (P, 4) as it has them, and other tables."""
+    if grid.panels is None:
+        return grid.replace(nodes=nodes, triangles=panels, **others)
+    return grid.replace(nodes=nodes, triangles=triangles_of(nodes, panels), panels=panels, **others)
 
 
 def images_of_members(lines: np.ndarray, number_of: np.ndarray) -> np.ndarray:
@@ -202,7 +212,7 @@ def images_of_lines(lines: Sequence[LineSet], number_of: np.ndarray) -> tuple[Li
 
 def _on_walls(grid: Grid, inside: np.ndarray, wedge: _Wedge, length: float) -> tuple[np.ndarray, np.ndarray]:
     """Return the nodes, those of the cut brought onto the planes, and on which walls (W, V) they are."""
-    uses = np.bincount(grid.half_edge_edges.reshape(3, -1)[:, inside].ravel(), minlength=len(grid.edges))
+    uses = np.bincount(grid.panel_members[inside].ravel(), minlength=len(grid.edges))
     cut = np.unique(grid.edges[(uses == 1) & (grid.edge_uses == 2)])
     nodes = grid.nodes.copy()
     on = np.zeros((len(wedge.walls), len(nodes)), bool)

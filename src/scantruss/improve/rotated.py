@@ -11,7 +11,8 @@ import numpy as np
 from ..errors import FrontError
 from ..grid.grid import Grid
 from ..grid.line_sets import LineSet
-from .mirrored import MIRROR_LINE, ON_PLANE, beyond_axis, images_of_lines, images_of_members, section_of
+from ..grid.panels import sides_of
+from .mirrored import MIRROR_LINE, ON_PLANE, beyond_axis, images_of_lines, images_of_members, section_of, with_panels
 
 if TYPE_CHECKING:
     from ..scan.rotation import Rotation
@@ -76,7 +77,8 @@ def rotated_grid(grid: Grid, rotation: Rotation, seams: list[np.ndarray], length
         away = places - centre
         return np.asarray(np.arctan2(away @ aside, away @ way))
 
-    kept = grid.triangles[(around(grid.nodes[grid.triangles].mean(axis=1)) % (2.0 * math.pi)) < part]
+    panels = grid.panel_table
+    kept = panels[(around(grid.nodes[panels].mean(axis=1)) % (2.0 * math.pi)) < part]
     if len(kept) == 0:
         raise FrontError("no grid lies in the part of the turn that is kept; leave --symmetry out", grid)
     nodes, base, shift, middle = _joined(grid, kept, rotation, around, length)
@@ -108,7 +110,7 @@ def _joined(
     """
     axis, centre = np.array(rotation.axis), np.array(rotation.point) - grid.origin
     part = 2.0 * math.pi / rotation.order
-    pairs = np.sort(np.concatenate([kept[:, [0, 1]], kept[:, [1, 2]], kept[:, [2, 0]]]), axis=1)
+    pairs = np.sort(sides_of(kept), axis=1)
     edges, uses = np.unique(pairs, axis=0, return_counts=True)
     outer = grid.edges[grid.edge_uses == 1]
     keys = {tuple(each) for each in np.sort(outer, axis=1).tolist()}
@@ -171,9 +173,10 @@ def _all_parts(
     lines = [
         pair for pair in np.sort(grid.lines, axis=1).tolist() if tuple(pair) in of_own or tuple(pair) not in on_seams
     ]
-    return grid.replace(
-        nodes=made,
-        triangles=np.concatenate([number_of[k][kept] for k in range(order)]),
+    return with_panels(
+        grid,
+        made,
+        np.concatenate([number_of[k][kept] for k in range(order)]),
         fixed=grid.fixed[source],
         lines=images_of_members(np.array(lines, np.int64).reshape(-1, 2), number_of),
         line_sets=images_of_lines(own, number_of),

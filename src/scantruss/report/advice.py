@@ -152,7 +152,7 @@ class Advice:
             return known
         if length not in self._begun:
             settings = self._settings.replace(length=length)
-            self._begun[length] = (settings, attempts(self._cloud, settings), AttemptLimit(settings.cells))
+            self._begun[length] = (settings, attempts(self._cloud, settings), AttemptLimit())
         settings, tried, limit = self._begun[length]
         before = limit.runs
         limit.allow(allowed)

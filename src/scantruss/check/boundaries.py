@@ -1,0 +1,76 @@
+"""Where the boundary of a grid leaves that of its scan, or cuts a corner of it off."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..constraints.network import curves_of
+from ..grid.certificate import Fault
+from ..kernels.boundary.curves import Curves, nearest_on_curves
+from .limits import HEXAGON_BOUNDARY, Figure
+
+if TYPE_CHECKING:
+    from ..boundary.find import Boundary
+    from ..grid.grid import Grid
+
+WARN_ASIDE = 0.25  # distance between the boundaries of grid and scan above which it is poor [member lengths]
+WARN_CUT = (
+    0.15  # distance of a corner of the boundary from the nearest node of it above which it is cut off [member lengths]
+)
+
+
+def places_aside(grid: Grid, boundary: Boundary, length: float) -> list[Fault]:
+    """Return warnings of a boundary that leaves the scan's, and of corners that it cuts off, each with its places.
+
+    Measured both ways: at a spike the nodes are off the curve of the scan, at a corner that is cut off the curve is off the members.
+
+    Parameters
+    ----------
+    grid : Grid
+        Of the same origin as the scan.
+    boundary : Boundary
+        Loops of the scan that the grid keeps.
+    length : float
+        Desired member length where the grid has none of its own [scan unit].
+    """
+    loops, chains = boundary.loops, grid.boundary_loops
+    if not loops or not chains:
+        return []
+    rim = np.concatenate(chains)
+    nodes, own = grid.nodes[rim], np.full(len(rim), length) if grid.desired is None else grid.desired[rim]
+    members = [length * (np.ones(len(loop.points)) if loop.desired is None else loop.desired) for loop in loops]
+    bend = HEXAGON_BOUNDARY**2 if grid.cells == "hexagon" else 1.0  # times as far long members leave a curve
+    chained = curves_of([grid.nodes[chain] for chain in chains], [True] * len(chains))
+    curve = np.concatenate([loop.points for loop in loops])
+    off = np.concatenate(
+        [_distances(boundary.curves, nodes) / own, _distances(chained, curve) / np.concatenate(members)]
+    )
+    corners = boundary.corners
+    at_corners = np.concatenate([each[loop.corner_at] for each, loop in zip(members, loops, strict=True)])
+    cut = np.array([np.linalg.norm(nodes - corner, axis=1).min() for corner in corners]) / at_corners
+    found = (
+        _figure("aside", "leaves the boundary of the scan by {:.2f} members", WARN_ASIDE * bend,
+                off, np.concatenate([nodes, curve]), np.concatenate([own, *members])),
+        _figure("cut", "cuts off a corner of the boundary by {:.2f} members", WARN_CUT, cut, corners, at_corners),
+    )  # fmt: skip
+    warnings = (replace(figure, places=figure.places + grid.origin).beyond(figure.poor) for figure in found)
+    return [warning for warning in warnings if warning is not None]
+
+
+def _distances(curves: Curves, places: np.ndarray) -> np.ndarray:
+    """Return the distance of each place (K, 3) from the nearest curve (K,)."""
+    return np.array([nearest_on_curves(curves, *place)[2] for place in places.tolist()])
+
+
+def _figure(
+    kind: str, words: str, poor: float, values: np.ndarray, places: np.ndarray, members: np.ndarray
+) -> Figure:  # fmt: skip
+    """Return a figure of values (K,) at places (K, 3) of which it keeps the worst within a member (K,) that are poor."""
+    kept: list[int] = []
+    for k in np.argsort(-values, kind="stable")[: int((values > poor).sum())].tolist():
+        if all(np.linalg.norm(places[k] - places[other]) > members[k] for other in kept):
+            kept.append(k)
+    return Figure(kind, values[kept], places[kept], np.inf, poor, words)
