@@ -104,7 +104,7 @@ def attempts(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:
             yield Attempt(settings.replace(limb_girth=share * settings.limb_girth))
     if rough > VERY_ROUGH_SCAN:
         yield from _smoothed(cloud, settings)
-    for look in looks:
+    for look in looks[:1]:  # opening would cut off sharp edges, which come first
         yield from list(_same_scan(look))[1:]
         settings = look if look.sharp_edges else settings
     if settings.keep_rods and settings.method == "default" and not hall and _has_rods(cloud, settings):
