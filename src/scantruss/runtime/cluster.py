@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import gc
 import multiprocessing
 import os
 import pickle
@@ -240,6 +241,7 @@ def _connect(scheduler: str) -> Any:
     except Exception as error:
         said = " ".join(str(error).split())[:80] or type(error).__name__
         said = said if isinstance(error, OSError | ValueError) else "something else answers there"
+    gc.collect()  # the client that failed closes now: found later, while another starts, both would wait for one lock
     raise InputError(f"no scheduler answers at {scheduler} ({said}); check the address")
 
 
