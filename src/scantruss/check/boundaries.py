@@ -39,8 +39,8 @@ def places_aside(grid: Grid, boundary: Boundary, length: float) -> list[Fault]:
     loops, chains = boundary.loops, grid.boundary_loops
     if not loops or not chains:
         return []
-    rim = np.concatenate(chains)
-    nodes, own = grid.nodes[rim], np.full(len(rim), length) if grid.desired is None else grid.desired[rim]
+    at = np.concatenate(chains)
+    nodes, own = grid.nodes[at], np.full(len(at), length) if grid.desired is None else grid.desired[at]
     members = [length * (np.ones(len(loop.points)) if loop.desired is None else loop.desired) for loop in loops]
     bend = HEXAGON_BOUNDARY**2 if grid.cells == "hexagon" else 1.0  # times as far long members leave a curve
     chained = curves_of([grid.nodes[chain] for chain in chains], [True] * len(chains))

@@ -27,7 +27,7 @@ STIFFNESS_OF_PARTS = 0.004  #: the same over all that pulls at a node
 STEP_OF_NODE = 0.05  #: farthest move of a node in one round, over the mean member
 WEIGHT_WITHIN = 0.3  #: weight of a part within the tolerance
 MISFIT_BISECTIONS = 20  #: of the least misfit
-STAGES_TOLD = 8  #: at most, of all that were on the way
+MOST_STAGES = 8  #: in the trade of kinds, of all that were on the way
 LEAST_MISFIT, MOST_MISFIT = 1e-4, 0.2  #: of parts that are alike
 
 
@@ -220,13 +220,13 @@ def trade_of(before: Grid, found: PartKinds, off_scan: Callable[[Grid], float] |
     off_scan : function, optional
         Largest distance of the nodes of a grid from the scan [unit of the grid].
     """
-    which = np.unique(np.linspace(0, len(found.stages) - 1, STAGES_TOLD).round().astype(int))
+    which = np.unique(np.linspace(0, len(found.stages) - 1, MOST_STAGES).round().astype(int))
     mean = float(before.lengths.mean())
     nodes = found.stages[0].nodes
     misfit, _ = found.parts.misfits(
         found.parts.vectors(nodes), np.arange(len(found.of)), mirrored=found.mirror_images_alike
     )
-    told = []
+    trade = []
     for stage in (found.stages[k] for k in which):
         low, high = 0.0, APART
         for _ in range(MISFIT_BISECTIONS):
@@ -241,8 +241,8 @@ def trade_of(before: Grid, found: PartKinds, off_scan: Callable[[Grid], float] |
             "moved_max": float(np.linalg.norm(stage.nodes - nodes, axis=1).max()) / mean,
             "length_cv": grid.quality.length_cv,
         }
-        told.append(each | ({} if off_scan is None else {"off_scan_max": off_scan(grid) / mean}))
-    return told
+        trade.append(each | ({} if off_scan is None else {"off_scan_max": off_scan(grid) / mean}))
+    return trade
 
 
 def kinds_report(before: Grid, found: PartKinds, tolerance: float) -> dict[str, Any]:

@@ -29,7 +29,7 @@ SOME_OF_RASTER = 20_000  # points of the rest that are looked at
 FAR_FROM_MIDDLE = (
     10.0  # widths of the middle half of a scan from its middle, beyond which a place that many points share has no data
 )
-SINGLE_STEP = 0.25  # step of coordinates in single precision, in mean distances between points, from which it is told
+SINGLE_STEP = 0.25  # step of coordinates in single precision from which a note says it [mean distances between points]
 MOST_INVALID_SHARE = 0.01  # share of the points that may be invalid; more are a fault of the file
 EXTENTS_READ = (1e-30, 1e30)  # of a scan in any unit; numbers with swapped bytes lie outside
 CAUSE = "the file is damaged, its byte order wrong, or it has no-data values"
