@@ -21,9 +21,9 @@ if TYPE_CHECKING:
     from .options import Parser
 
     OffScan = Callable[[Grid], float] | None
-    Told = tuple[dict[str, Any], list[str], Callable[[], bytes]]
+    Outcome = tuple[dict[str, Any], list[str], Callable[[], bytes]]
 
-LENGTHS_ALIKE, JOINTS, _ = ALIKE = ("lengths", "joints", "panels")  # what shall be alike
+LENGTHS, JOINTS, PANELS = "lengths", "joints", "panels"  # what shall be alike
 USUAL_LENGTHS = 12  # that are aimed at
 WARNED_OFF_SCAN = 0.05  # distance of a node from the scan that is warned of beyond [mean members]
 MIRROR_IMAGES = ("different", "same")  # what mirror images are
@@ -42,8 +42,8 @@ def families_parser() -> Parser:
     add_outs(parser, "results; the suffix names the format", "*")
     parser.add_argument(
         "--parts",
-        choices=ALIKE,
-        default=LENGTHS_ALIKE,
+        choices=(LENGTHS, JOINTS, PANELS),
+        default=LENGTHS,
         help="what shall be alike: lengths of members, joints, as the directions of their members, or panels (default lengths)",
     )
     parser.add_argument(
@@ -101,7 +101,7 @@ def families(values: Namespace) -> None:
     report = None if values.report is None else check_place(values.report, (".json",))
     plot = None if values.plot is None else check_place(values.plot, (".png",))
     taken = {Path(name).resolve(): what for name, what in ((values.grid, "grid"), (values.scan, "scan")) if name}
-    if values.parts == LENGTHS_ALIKE and values.mirrored is not None:
+    if values.parts == LENGTHS and values.mirrored is not None:
         raise InputError("lengths have no mirror images; leave --mirrored out, or use --parts joints or panels")
     if values.parts != JOINTS and values.uneven is not None:
         raise InputError(f"--uneven is for --parts joints; leave it out with {values.parts}")
@@ -189,7 +189,7 @@ def _alike(before: Grid, values: Namespace) -> Families | PartKinds:
     from ..layouts.joints_alike import USUAL_UNEVENNESS, few_joints
     from ..layouts.panels_alike import few_panels
 
-    if values.parts == LENGTHS_ALIKE:
+    if values.parts == LENGTHS:
         return few_lengths(before, values.tolerance, _lengths_wanted(values))
     count, mirrored = 1 if values.count is None else values.count, values.mirrored == MIRROR_IMAGES[1]
     if values.parts == JOINTS:
@@ -203,7 +203,7 @@ def _lengths_wanted(values: Namespace) -> int:
     return USUAL_LENGTHS if values.count is None else int(values.count)
 
 
-def _of_lengths(before: Grid, found: Families, values: Namespace, off_scan: OffScan) -> Told:
+def _of_lengths(before: Grid, found: Families, values: Namespace, off_scan: OffScan) -> Outcome:
     """Return the figures of lengths, the same in words, and what draws them."""
     from ..export.drawing.families import encode_families
     from ..layouts.families import family_report
@@ -212,7 +212,7 @@ def _of_lengths(before: Grid, found: Families, values: Namespace, off_scan: OffS
     return figures, _words(figures), lambda: encode_families(before, values.tolerance, off_scan=off_scan)
 
 
-def _of_kinds(before: Grid, found: PartKinds, values: Namespace, off_scan: OffScan) -> Told:
+def _of_kinds(before: Grid, found: PartKinds, values: Namespace, off_scan: OffScan) -> Outcome:
     """Return the figures of joints or panels, the same in words, and what draws them."""
     from ..export.drawing.families import encode_kinds
     from ..layouts.alike import kinds_report, trade_of
