@@ -16,7 +16,7 @@ from typed import known
 
 import scantruss as st
 from scantruss import candidates, pipeline
-from scantruss.attempts import LENGTHS, MOST_RUNS, SMOOTHED, Attempt, AttemptLimit, attempts
+from scantruss.attempts import FRONT_LENGTHS, MOST_RUNS, SMOOTHED, Attempt, AttemptLimit, attempts
 from scantruss.errors import CertificateError, FrontError
 from scantruss.improve.optimize import improve_last
 from scantruss.scan.formats.writing import write_points
@@ -82,7 +82,7 @@ def test_each_kind_begins_with_the_fields_of_the_effort_and_then_does_without() 
     for (_, method), starts in by_kind.items():
         lone = starts[1:] if method == "default" else starts
         assert method == "paper" or starts[0] is None
-        assert [(way.scale, way.laid) for (way,) in lone] == [(share, False) for share in LENGTHS]
+        assert [(way.scale, way.laid) for (way,) in lone] == [(share, False) for share in FRONT_LENGTHS]
 
 
 def refusing(monkeypatch: pytest.MonkeyPatch, passes: Callable[[Any], bool]) -> list[Any]:
@@ -134,7 +134,7 @@ def test_no_more_grids_are_made_than_the_law_says(monkeypatch: pytest.MonkeyPatc
 
 @pytest.mark.parametrize("method", ["default", "paper"])
 def test_a_front_of_another_length_is_taken_where_the_first_fails(monkeypatch: pytest.MonkeyPatch, method: str) -> None:
-    refusing(monkeypatch, lambda a: a.starts is not None and a.starts[0].scale == LENGTHS[2])
+    refusing(monkeypatch, lambda a: a.starts is not None and a.starts[0].scale == FRONT_LENGTHS[2])
     grid = st.grid_from_points(cap(4.0, 1.0, 0.25), st.Settings(length=1.0, method=method))
     assert known(grid.certificate).passed and grid.settings == st.Settings(length=1.0, method=method)
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from .settings import Settings
 
 # lengths of the fronts without rows, in desired lengths, tried in turn where no other passes
-LENGTHS = (1.0, 0.97, 1.04)
+FRONT_LENGTHS = (1.0, 0.97, 1.04)
 COARSER_SAMPLES = (1.1, 1.2, 1.3)  # distances of the surface samples that are tried instead, in those of the settings
 SMOOTHED = (0.5, 1.0)  # scales over which a rough scan is smoothed where no grid passes without [member lengths]
 # shares of thick samples from which on a scan is rough, and so rough that its mean surface comes first
@@ -186,14 +186,14 @@ def _smoothed(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:
             if sample_surface(cloud, smoothed).layers[1] > 0.0:  # two sheets would become one
                 return
             yield Attempt(smoothed)
-            yield Attempt(smoothed, (FieldStart(scale=LENGTHS[0], laid=False),))
+            yield Attempt(smoothed, (FieldStart(scale=FRONT_LENGTHS[0], laid=False),))
 
 
 def _same_scan(settings: Settings) -> Iterator[Attempt]:
     """Yield the attempts with one look at the scan: by rows, then by fronts that make all of their nodes themselves."""
     if settings.method == "default":
         yield Attempt(settings)
-    for share in LENGTHS:
+    for share in FRONT_LENGTHS:
         yield Attempt(settings, (FieldStart(scale=share, laid=False),))
 
 
