@@ -161,6 +161,49 @@ def test_a_quick_request_gives_way_to_a_run() -> None:
     assert worker.wait(PATIENCE) and done == ["run"]
 
 
+def test_of_quick_requests_that_follow_fast_some_come_to_their_end() -> None:
+    """A slider that moves without a pause would else show nothing until it rests."""
+    worker = Worker(lambda error: None, lambda stage, share: None)
+    begun, go = threading.Event(), threading.Event()
+    done: list[int] = []
+
+    def first(progress: Progress) -> None:
+        begun.set()
+        go.wait(PATIENCE)
+        progress("grid", 0.5)
+        done.append(0)
+
+    assert worker.ask(first, quick=True) and begun.wait(PATIENCE)
+    for number in (1, 2, 3):
+        assert worker.ask(lambda progress, number=number: done.append(number), quick=True)
+    go.set()
+    assert worker.wait(PATIENCE) and done == [0, 3]  # what runs, then the newest
+
+
+@pytest.mark.parametrize("refused", [False, True])
+def test_a_run_that_goes_on_with_another_waits_for_it(refused: bool) -> None:
+    """The structure is that of the grid that is being made, not of the one before."""
+    told: list[Exception | None] = []
+    worker = Worker(told.append, lambda stage, share: None)
+    begun, go = threading.Event(), threading.Event()
+    done: list[str] = []
+
+    def grid(progress: Progress) -> None:
+        begun.set()
+        go.wait(PATIENCE)
+        progress("front", 0.5)
+        done.append("grid")
+        if refused:
+            raise st.InputError("no")
+
+    assert worker.ask(grid) and begun.wait(PATIENCE)
+    assert worker.ask(lambda progress: done.append("structure"), then=True)
+    go.set()
+    assert worker.wait(PATIENCE)
+    assert done == (["grid"] if refused else ["grid", "structure"])
+    assert [type(each) for each in told] == ([st.InputError] if refused else [type(None)] * 2)  # which stays on the page
+
+
 @pytest.mark.parametrize("content", [b"", b"PK\x03\x04", b"text"])
 def test_a_damaged_project_is_refused_in_one_line(content: bytes, tmp_path: Path) -> None:
     path = tmp_path / "a.scantruss"

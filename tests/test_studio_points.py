@@ -1,5 +1,6 @@
 """Points in the studio: their own colours and classes, those removed by hand, the tape, and where projects are saved."""
 
+import json
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -10,10 +11,12 @@ from scan_files import axes, e57, pcd
 from scipy.spatial.transform import Rotation
 
 import scantruss as st
+from scantruss.cli.main import main
 from scantruss.scan.formats.own_colors import own_colors
 from scantruss.scan.formats.reading import read_points
 from scantruss.studio.browsers import Browsers
 from scantruss.studio.colours import CLASSES, OWN_COLORS, colorings_of_scan, colors_of, colors_of_scan, rgb_of
+from scantruss.studio.frame import distance_to_see
 from scantruss.studio.outputs import TAKEN, command_of, settings_files
 from scantruss.studio.pictures import about_z, angle_to_see, facing, over
 from scantruss.studio.project import save_project
@@ -214,6 +217,54 @@ def test_a_project_whose_cleaning_named_the_taken_points_still_opens(
     again = Session()
     again.open(tmp_path / "old.scantruss")
     assert np.array_equal(again.state.taken(), taken)
+
+
+def test_a_crop_keeps_the_cleaning_and_the_command_line_does_the_same(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    far = np.concatenate([P, [[4.0, 3.0, 9.0]]])
+    np.savetxt(tmp_path / "a.xyz", far)
+    session = opened(tmp_path / "a.xyz", tmp_path / "a.scantruss")
+    session.propose_cleaning(3.0, 0.005)
+    assert session.worker.wait(120)
+    session.clean()
+    box = "box:2,1,-1,7,6,10"
+    session.crop((box,))
+    inside = (X >= 2) & (X <= 7) & (Y >= 1) & (Y <= 6)
+    cloud = session.cloud
+    assert cloud is not None and len(cloud.points) == inside.sum()  # the outlier above stays away
+    assert session.state.cropped_off().sum() == (~inside).sum()
+    again = Session()
+    again.open(tmp_path / "a.scantruss")
+    assert again.state.cleaning is not None and again.state.cleaning.crop == ()
+    clean = command_of(session.state).splitlines()[0]
+    assert "--crop" not in clean and box not in clean
+    settings = json.loads(settings_files(session.state)["grid.settings.json"])
+    monkeypatch.chdir(tmp_path)
+    assert main(clean.split()[1:]) == 0
+    read = read_points("clean.ply", selection=st.Settings.from_dict(settings).selection)
+    assert np.allclose(read.points + read.origin, cloud.points + cloud.origin, atol=1e-9)
+    session.undo()
+    session.undo()
+    session.crop((box,))
+    session.propose_cleaning(3.0, 0.005)
+    assert session.worker.wait(120)
+    session.clean()
+    session.crop((box, "box:3,1,-1,7,6,10"))
+    assert session.state.cleaning is not None  # what is left was looked at
+    session.crop(())
+    assert session.state.cleaning is None and session.history.words[0] == "no crop, not cleaned"
+
+
+def test_the_first_view_shows_all_of_a_scan_and_little_more() -> None:
+    rng, back = np.random.default_rng(3), np.array([0.8, -1.4, 0.9])
+    for aspect in (0.4, 1.0, 1.8):
+        points = rng.uniform(-1, 1, (200, 3)) * rng.uniform(0.5, 5.0, 3)
+        place = distance_to_see(points, back, 0.65, aspect) * back / np.linalg.norm(back)
+        w, x, y, z = facing(place, np.zeros(3))
+        seen = (points - place) @ Rotation.from_quat([x, y, z, w]).as_matrix()
+        edge = (np.abs(seen[:, :2]) / seen[:, 2:] / [np.tan(0.325) * aspect, np.tan(0.325)]).max()
+        assert edge == pytest.approx(1.0, rel=1e-6)
 
 
 def test_what_is_drawn_of_loads() -> None:

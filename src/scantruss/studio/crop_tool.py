@@ -66,11 +66,12 @@ class CropTool:
     # ---- box
 
     def _box(self) -> None:
-        """Show a box around the scan, or the one that is typed, with a handle at its lowest and highest corner."""
+        """Show a box around the points that are taken, or the one that is typed, with a handle at its lowest and highest corner."""
         self._check()
         self._clear()
-        frame, whole = self.view.frame, self._whole()
-        low, high = frame.to_scene(np.stack([whole.min(axis=0), whole.max(axis=0)]))
+        frame, cloud = self.view.frame, self.view.session.cloud
+        assert cloud is not None
+        low, high = frame.to_scene(np.stack(cloud.bounds) + cloud.origin)
         for part in self.words.value.split():
             if part.startswith("box:") and len(numbers := parts_of(part)[1][0][0]) == 6:
                 low, high = frame.to_scene(np.array(numbers).reshape(2, 3))
@@ -80,26 +81,31 @@ class CropTool:
             )
             handle.on_update(self._dragged)
             self._handles.append(handle)
+        self.view.see(np.concatenate([self._box_corners(), frame.corners]))
         self._show_box()
 
     def _dragged(self, event: Any) -> None:
         self.view.do_quietly(partial(self._show_box, event.phase == "end"))
 
     def _show_box(self, tells: bool = True) -> None:
-        ends = np.sort(np.array([handle.position for handle in self._handles]), axis=0)
-        corners = np.array([[ends[k >> axis & 1, axis] for axis in range(3)] for k in range(8)])
+        corners = self._box_corners()
         self.view.scene.lines("/crop", corners[BOX_EDGES], np.array(CROP_COLOR, np.uint8), 4.0)
         if tells:
-            numbers = self.view.frame.from_scene(ends).ravel().tolist()
+            numbers = self.view.frame.from_scene(corners[[0, -1]]).ravel().tolist()
             self.words.value = "box:" + ",".join(f"{number:.7g}" for number in numbers)
             self._show_outside()
 
+    def _box_corners(self) -> np.ndarray:
+        """Return the corners (8, 3) of the box between the handles, in the scene, the lowest first and the highest last."""
+        ends = np.sort(np.array([handle.position for handle in self._handles]), axis=0)
+        return np.array([[ends[k >> axis & 1, axis] for axis in range(3)] for k in range(8)])
+
     def _show_outside(self) -> None:
         """Draw the points outside the present crop too, so that it can be made larger."""
-        taken, whole = self.view.session.cloud, self.view.session.state.whole
-        if taken is None or whole is None or whole.cloud is taken:
-            return
-        self.view.scene.thinned("/crop outside", self.view.frame.to_scene(self._whole()), OUTSIDE_COLOR)
+        state = self.view.session.state
+        if state.settings.crop:
+            outside = self._whole()[state.cropped_off()]
+            self.view.scene.thinned("/crop outside", self.view.frame.to_scene(outside), OUTSIDE_COLOR)
 
     def _whole(self) -> np.ndarray:
         """Return the points of the scan as it was opened (N, 3), in its own frame [scan unit]."""

@@ -36,8 +36,11 @@ class FeatureList:
     def _find(self) -> None:
         if self.shown.value:
             self.view.session.show_features()
+            self.view.click.value = SWITCH_MODE
         else:
             self.view.session.wants_features = False
+            if self.view.click.value == SWITCH_MODE:
+                self.view.click.value = self.view.clicks[0]
 
     def clicked(self, origin: np.ndarray, ahead: np.ndarray) -> None:
         """Switch the hole or ridge under a ray of the scene."""

@@ -73,8 +73,11 @@ def project_file(state: StudioState, place: Path | None) -> dict[str, bytes]:
 def _of_the_file(state: StudioState) -> Settings:
     """Return the settings that make the grid from the file that is read: a cleaned one holds the chosen points only."""
     made = state.settings if state.grid is None or state.asked is None else state.asked
-    is_whole = state.cleaning is None and state.removed is None
-    return made if is_whole else made.replace(classes=(), crop=())
+    if state.removed is not None:
+        return made.replace(classes=(), crop=())
+    if state.cleaning is None:
+        return made
+    return made.replace(classes=(), crop=tuple(part for part in made.crop if part not in state.cleaning.crop))
 
 
 def settings_files(state: StudioState) -> dict[str, bytes]:
@@ -103,9 +106,9 @@ def command_of(state: StudioState) -> str:
     if state.removed is not None:
         name = TAKEN
     elif state.cleaning is not None:
-        chosen = state.settings
-        taken = ["--class", ",".join(map(str, chosen.classes))] if chosen.classes else []
-        taken += [word for part in chosen.crop for word in ("--crop", part)]
+        classes = state.settings.classes
+        taken = ["--class", ",".join(map(str, classes))] if classes else []
+        taken += [word for part in state.cleaning.crop for word in ("--crop", part)]
         lines.append(shlex.join(["scantruss", "clean", name, CLEANED, *taken, *state.cleaning.options]))
         name = CLEANED
     lines += [

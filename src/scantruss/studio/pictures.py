@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError
+from .frame import ROOM_AROUND
 from .scene import sky
 
 if TYPE_CHECKING:
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 LARGE_PICTURE = (2160, 3840)  #: height and width of a picture [pixel]
 TURN_SIZE = (540, 960)  #: height and width of a turntable [pixel]
 TURN_FRAMES, TURN_MILLISECONDS = 36, 100  #: of a turntable, and how long each is shown
-TURNED_POINTS, ROOM_AROUND = 5_000, 1.1  #: points that a turntable must show, and what it shows over what it must
+TURNED_POINTS = 5_000  #: that a turntable must show
 PICTURE_PATIENCE = 120.0  #: how long the browser may take for a picture [s]
 BEHIND_PICTURE = {False: (255, 255, 255), True: (20, 20, 20)}  #: behind a picture of a light and a dark page
 

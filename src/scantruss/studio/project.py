@@ -25,7 +25,7 @@ from ..structure.statics import Solution
 from .scan_parts import Cleaning, WholeScan, part_of_scan, taken_of_scan
 from .state import Design, StudioState
 
-PROJECT_FORMAT, PROJECT_VERSION = "scantruss-project", 4
+PROJECT_FORMAT, PROJECT_VERSION = "scantruss-project", 5
 CLEANING_OF_PART = 3  #: last version in which a cleaning named the points of the part that was taken
 PROJECT_PARTS = ("made_by.npy", "project.json", "scan.npz", "removed.npy", "by_hand.npy", "structure.toml", "grid.json",
                  "structure.json")  # fmt: skip
@@ -50,7 +50,7 @@ def save_project(path: Path, state: StudioState) -> None:
         "format": PROJECT_FORMAT, "format_version": PROJECT_VERSION, "made_by": MARK,
         "scan": {"unit": cloud.unit, "system": cloud.system, "name": Path(cloud.name).name, "dropped": cloud.dropped,
                  "notes": list(cloud.notes), "left_out": [list(part) for part in cloud.left_out]},
-        "cleaning": None if cleaning is None else [cleaning.outlier_distance, cleaning.loose_pieces],
+        "cleaning": None if cleaning is None else [cleaning.outlier_distance, cleaning.loose_pieces, list(cleaning.crop)],
         "settings": state.settings.to_dict(), "solved": solved, "quick": state.is_live,
         "asked": None if state.asked is None else state.asked.to_dict(),
         "tape": [list(end) for end in state.tape],
@@ -155,7 +155,8 @@ def _project_of(parts: dict[str, bytes]) -> tuple[StudioState, bool]:
             of = taken_of_scan(whole, settings)
         removes = np.zeros(len(of), np.bool_)
         removes[of] = _bits(parts["removed.npy"], int(of.sum()))
-        cleaning = Cleaning(float(numbers[0]), float(numbers[1]), removes)
+        of_part = tuple(map(str, numbers[2])) if len(numbers) > 2 else settings.crop
+        cleaning = Cleaning(float(numbers[0]), float(numbers[1]), removes, crop=of_part)
     removed = _bits(parts["by_hand.npy"], len(cloud.points)) if "by_hand.npy" in parts else None
     state = StudioState(
         cloud=part_of_scan(whole, settings, cleaning, removed),

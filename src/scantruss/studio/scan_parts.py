@@ -24,6 +24,7 @@ class Cleaning:
     loose_pieces: float
     removes: np.ndarray  #: (N,) bool, of the whole scan; of the points that are taken while it is proposed
     words: tuple[str, ...] = ()
+    crop: tuple[str, ...] = ()  #: of the part that was cleaned
 
     @property
     def options(self) -> list[str]:

@@ -168,6 +168,7 @@ class ScanSteps(Steps):
             whole = replace(whole, cloud=part if same and part else replace(whole.cloud, unit=unit, system=""))
         self.change("unit", cloud=part, whole=whole, settings=self.settings.replace(unit=unit), **NO_GRID)
         self.save()
+        self.show_quick()
 
     def length_bounds(self) -> tuple[float, float]:
         """Return the lengths that the slider offers: about the suggested one, within what the scan allows [scan unit]."""
@@ -182,12 +183,17 @@ class ScanSteps(Steps):
     def crop(self, words: tuple[str, ...]) -> None:
         """Take what lies in all of some parts of space, in the words of ``--crop``; none: all of it.
 
+        A cleaning stays done where nothing is taken that it has not looked at.
+
         Raises
         ------
         InputError
             A part of space cannot be read, or no point lies in it.
         """
-        self._take("crop" if words else "no crop", self.settings.replace(crop=words), None, self.state.removed)
+        cleaning, settings = self.state.cleaning, self.settings.replace(crop=words)
+        kept = cleaning if cleaning is not None and set(cleaning.crop) <= set(settings.crop) else None
+        said = ("crop" if words else "no crop") + (", not cleaned" if kept is not cleaning else "")
+        self._take(said, settings, kept, self.state.removed)
 
     def choose_classes(self, classes: tuple[int, ...]) -> None:
         """Take the points of some classes; none: all of them."""
@@ -233,7 +239,7 @@ class ScanSteps(Steps):
             raise InputError("the scan has been cleaned already; take that back with Undo to clean it otherwise")
         removes = self.state.taken()
         removes[removes] = proposal.removes
-        self._take("clean", self.settings, replace(proposal, removes=removes), self.state.removed)
+        self._take("clean", self.settings, replace(proposal, removes=removes, crop=self.settings.crop), self.state.removed)
 
     def remove_points(self, goes: np.ndarray) -> None:
         """Remove some of the points that are taken (M,) bool.
@@ -266,7 +272,7 @@ class ScanSteps(Steps):
         self.tell()
 
     def _take(self, words: str, settings: Settings, cleaning: Cleaning | None, removed: np.ndarray | None) -> None:
-        """Take a part of the scan; a crop or a choice of classes comes before cleaning, and so forgets it."""
+        """Take a part of the scan."""
         whole = self.state.whole
         if whole is None:
             raise InputError("there is no scan yet; open one")

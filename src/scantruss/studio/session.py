@@ -124,6 +124,10 @@ class Session(ScanSteps):
         if self.wants_features:
             self.worker.ask(self._find_features, quick=True)
 
+    def _show_again(self) -> None:
+        if not self.show_quick():  # which looks for them too
+            self._look_for_features()
+
     def _find_features(self, progress: Progress) -> None:
         cloud, settings = self.cloud, self.settings.replace(fill_at=(), no_ridge_at=(), effort="quick")
         if not self.wants_features or cloud is None:
@@ -188,7 +192,7 @@ class Session(ScanSteps):
             self.change("run", solution=solved.solution, report=solved.report)
             self.save()
 
-        self.worker.ask(run)
+        self.worker.ask(run, then=True)
 
     # ---- designs, files
 

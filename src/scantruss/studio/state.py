@@ -54,6 +54,12 @@ class StudioState:
         assert self.whole is not None
         return taken_of_scan(self.whole, self.settings, self.cleaning, self.removed)
 
+    def cropped_off(self) -> np.ndarray:
+        """Return which points of the whole scan nothing but the crop leaves out (N,)."""
+        assert self.whole is not None
+        all_of_it = self.settings.replace(crop=())
+        return taken_of_scan(self.whole, all_of_it, self.cleaning, self.removed) & ~self.taken()
+
     @property
     def is_stale(self) -> bool:
         """Whether settings have changed since the grid was made."""

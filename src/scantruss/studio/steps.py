@@ -123,11 +123,11 @@ class Steps:
                 return
             self.state, self._turn, self.message = other, self._turn + 1, ""
         self.save()
-        self._look_for_features()
+        self._show_again()
         self.tell()
 
-    def _look_for_features(self) -> None:
-        """Look again for what the page draws of the scan."""
+    def _show_again(self) -> None:
+        """Make again what the page draws of a state and its record does not hold."""
 
     def stop(self) -> None:
         """Stop what runs; the grid before it stays."""

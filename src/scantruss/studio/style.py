@@ -14,7 +14,7 @@ PANEL_STYLE = """<style>
   :is(.multi-slider-mark-label, .mantine-Slider-markLabel, .mantine-Notification-description) { color: #545b62 !important }
 [data-mantine-color-scheme="dark"]
   :is(.multi-slider-mark-label, .mantine-Slider-markLabel, .mantine-Notification-description) { color: #b4bac0 !important }
-pre code { white-space: pre-wrap }
+pre { white-space: pre-wrap !important; overflow-wrap: anywhere }
 .mantine-ScrollArea-viewport { overflow-x: hidden !important }
 .mantine-ScrollArea-scrollbar[data-orientation="horizontal"] { display: none }
 </style>"""

@@ -75,15 +75,15 @@ class StructureTab:
             "material": gui.add_text("material", kept.material),
             "loads": gui.add_text("loads", ",".join(map(str, kept.loads)), hint="self,snow:1kN/m2,wind:0.8kN/m2:-0.7"),
         }
-        self.numbers = {"scale": gui.add_text("scale", "1", hint="of the structure to the grid")}
+        self.numbers = {"scale": gui.add_text("scale", f"{kept.scale:g}", hint="of the structure to the grid")}
         with gui.add_folder("Sizing and modes", expand_by_default=False):
             self.numbers["size"] = gui.add_text(
-                "size", "0", hint="different sections that are chosen at most; 0: as above"
+                "size", str(kept.size), hint="different sections that are chosen at most; 0: as above"
             )
             self.words["size_by"] = gui.add_dropdown(
                 "each section for", WAYS_TO_GROUP, initial_value=kept.size_by, hint="what gets a section of its own"
             )
-            self.numbers["buckling"] = gui.add_text("buckling modes", "0", hint="of the combination that buckles first")
+            self.numbers["buckling"] = gui.add_text("buckling modes", str(kept.buckling), hint="of the combination that buckles first")
             self.numbers["frequencies"] = gui.add_text("frequencies", str(kept.frequencies), hint="lowest natural ones")
         run = gui.add_button("Run", color="blue")
         self.results, self.weights = gui.add_markdown(""), gui.add_html("")

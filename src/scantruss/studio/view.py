@@ -16,7 +16,7 @@ from ..export.model import Model
 from ..export.page_tables import Tables, tables_of
 from ..structure.build import scale_of
 from .colours import colorings_of_scan
-from .frame import BESIDE_FIRST, DRAWN_EXTENT, SceneFrame
+from .frame import BESIDE_FIRST, DRAWN_EXTENT, ROOM_AROUND, SceneFrame, distance_to_see
 from .legends import Legends
 from .outputs import model_to_show
 from .picking import NEAR_ENOUGH, pick
@@ -40,7 +40,7 @@ NATURAL_VIEW = 0.65  #: of the camera, upright [rad]
 PLAN_VIEW = 0.08  #: the same of a plan, seen from so far that heights hardly matter [rad]
 PLAN_FAR = 1.3  #: of the camera above a plan, so that all of it is seen [distance at which it fills the view]
 PANEL_WIDTH, USUAL_WIDTH = 452, 1280  #: of the panel; of a page that has not said its own [pixel]
-WIDE_ENOUGH = 1.15  #: width over height of a drawing whose width does not limit what is seen
+SEEN_FROM = np.array([0.8, -1.4, 0.9])  #: direction from which the scan is seen first
 STEP_NAMES = ("Stop", "Undo", "Redo")
 SMALL_PICTURE, PICTURE_WAIT = (
     (8, 8),
@@ -299,10 +299,16 @@ class StudioView:
 
     def overview(self, designs: int = 1) -> None:
         """Move the camera so that all of the scan is seen, or of several designs side by side."""
-        middle = np.array([0.5 * BESIDE_FIRST * DRAWN_EXTENT * (designs - 1), 0.0, 0.0])
-        far = DRAWN_EXTENT * (0.3 + 0.7 * designs) * max(1.0, WIDE_ENOUGH / self._aspect)
+        corners = self.frame.corners
+        aside = np.array([BESIDE_FIRST * DRAWN_EXTENT * (designs - 1), 0.0, 0.0])
+        self.see(np.concatenate([corners, corners + aside]))
+
+    def see(self, places: np.ndarray) -> None:
+        """Move the camera so that places of the scene (N, 3) are seen."""
+        middle = (places.min(axis=0) + places.max(axis=0)) / 2
+        far = ROOM_AROUND * distance_to_see(places - middle, SEEN_FROM, NATURAL_VIEW, self._aspect)
         self.client.camera.fov = NATURAL_VIEW
-        self.client.camera.position = tuple(middle + far * np.array([0.8, -1.4, 0.9]))
+        self.client.camera.position = tuple(middle + far * SEEN_FROM / np.linalg.norm(SEEN_FROM))
         self.client.camera.look_at = tuple(middle)
 
     def update(self) -> None:

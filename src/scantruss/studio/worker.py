@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 from threading import Condition, Thread
+from typing import NamedTuple
 
 from ..errors import ScanTrussError, words_of_error
 from ..runtime.progress import Progress
@@ -14,6 +15,14 @@ Task = Callable[[Progress], None]
 
 class StoppedError(Exception):
     """Raised within a task that was stopped or overtaken."""
+
+
+class _Asked(NamedTuple):
+    """A task that was asked for."""
+
+    do: Task
+    quick: bool
+    then: bool
 
 
 class Worker:
@@ -29,20 +38,28 @@ class Worker:
 
     def __init__(self, tell: Callable[[Exception | None], None], progress: Progress) -> None:
         self._tell, self._progress = tell, progress
-        self._waiting: tuple[Task, bool] | None = None
-        self._running: tuple[Task, bool] | None = None
+        self._waiting: list[_Asked] = []
+        self._running: _Asked | None = None
         self._stop = False
         self._change = Condition()
         self._thread: Thread | None = None
 
-    def ask(self, task: Task, *, quick: bool = False) -> bool:
-        """Do a task as soon as may be, in place of what waits; whether it is taken: a quick one is not while another waits or runs."""
+    def ask(self, task: Task, *, quick: bool = False, then: bool = False) -> bool:
+        """Do a task as soon as may be, in place of what waits; whether it is taken.
+
+        Parameters
+        ----------
+        quick : bool
+            It is not taken while a task that is not quick waits or runs. One that runs comes to its end: of many that are asked for one
+            after the other, some are seen.
+        then : bool
+            It goes on with what waits and runs, which comes to its end first; where that is refused it is forgotten.
+        """
         with self._change:
-            busy = [one for one in (self._running, self._waiting) if one is not None and not one[1]]
-            if quick and busy:
+            if quick and not all(one is None or one.quick for one in (self._running, *self._waiting)):
                 return False
-            self._waiting = (task, quick)
-            self._stop = self._running is not None
+            self._waiting = [*(self._waiting if then else ()), _Asked(task, quick, then)]
+            self._stop = self._stop or not (then or quick)
             if self._thread is None:
                 self._thread = Thread(target=self._serve, name="scantruss studio", daemon=True)
                 self._thread.start()
@@ -52,12 +69,12 @@ class Worker:
     def stop(self) -> None:
         """Stop what runs and forget what waits."""
         with self._change:
-            self._waiting, self._stop = None, True
+            self._waiting, self._stop = [], True
 
     def wait(self, seconds: float) -> bool:
         """Wait until nothing runs or waits; whether that is so."""
         with self._change:
-            return self._change.wait_for(lambda: self._running is None and self._waiting is None, seconds)
+            return self._change.wait_for(lambda: self._running is None and not self._waiting, seconds)
 
     def _heard(self, stage: str, share: float) -> None:
         if self._stop:
@@ -67,10 +84,9 @@ class Worker:
     def _serve(self) -> None:
         while True:  # in a daemon thread: it ends with the process
             with self._change:
-                self._change.wait_for(lambda: self._waiting is not None)
-                assert self._waiting is not None
-                self._running, self._waiting, self._stop = self._waiting, None, False
-                task = self._running[0]
+                self._change.wait_for(lambda: bool(self._waiting))
+                self._running, self._stop = self._waiting.pop(0), False
+                task = self._running.do
             fault: Exception | None = None
             try:
                 task(self._heard)
@@ -84,6 +100,8 @@ class Worker:
                 sys.excepthook(*sys.exc_info())
             with self._change:
                 self._running = None
+                if fault is not None:
+                    self._waiting = [each for each in self._waiting if not each.then]
                 self._change.notify_all()
 
 
