@@ -16,11 +16,11 @@ from scantruss.cli.families import _of_kinds, families_parser
 from scantruss.cli.main import main
 from scantruss.errors import InputError
 from scantruss.export.json import encode_json
-from scantruss.layouts.alike import trade_of
 from scantruss.layouts.images import Images
 from scantruss.layouts.joints_alike import stars_of
 from scantruss.layouts.panels_alike import corners_of
 from scantruss.layouts.part_vectors import PartVectors
+from scantruss.layouts.trade import traded_kinds
 
 
 def laid(one: np.ndarray, other: np.ndarray) -> float:
@@ -133,7 +133,7 @@ def test_what_is_symmetric_stays_so_and_fewer_can_be_enough() -> None:
 def test_the_trade_begins_with_the_grid_as_it_was() -> None:
     grid = uneven(6)
     found = st.few_panels(grid, 0.02)
-    trade = trade_of(grid, found)
+    trade = [each.to_dict() for each in traded_kinds(grid, found)]
     assert trade[0]["moved_max"] == 0 and trade[0]["kinds"] == found.before
     assert trade[0]["plain_misfit_max"] <= 0.02 + 1e-5
     plain = [each["plain_misfit_max"] for each in trade]

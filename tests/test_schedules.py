@@ -25,7 +25,7 @@ from scantruss.grid.line_sets import RIDGE, LineSet
 from scantruss.grid.marks import member_marks, node_marks, numbered, panel_marks
 from scantruss.runtime.ours import kind_of_ours
 from scantruss.schedules import files
-from scantruss.schedules.clusters import cluster_lengths, cluster_nodes, cluster_panels
+from scantruss.schedules.clusters import PanelSizes, cluster_lengths, cluster_nodes, cluster_panels
 from scantruss.schedules.files import encode_xlsx, schedule_paths
 from scantruss.schedules.joints import clear_radii, find_joints
 
@@ -180,7 +180,7 @@ def test_lengths_have_the_fewest_types_and_no_panel_or_length_differs_by_more_th
         fewest += 1
     assert len(types.representative) == fewest
     sides = np.resize(lengths, (len(lengths), 3)) + 10.0
-    panels = cluster_panels(sides, tolerance)
+    panels = cluster_panels(PanelSizes(sides), tolerance)
     for mine, theirs, misfit in zip(sides, sides[panels.representative[panels.of]], panels.misfit, strict=True):
         assert min(np.abs(np.roll(mine, k) - theirs).max() for k in range(3)) == misfit <= tolerance
 

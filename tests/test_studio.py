@@ -2,6 +2,7 @@
 
 import threading
 import time
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -161,6 +162,10 @@ def test_a_quick_request_gives_way_to_a_run() -> None:
     assert worker.wait(PATIENCE) and done == ["run"]
 
 
+def _note(done: list[int], number: int, _: Progress) -> None:
+    done.append(number)
+
+
 def test_of_quick_requests_that_follow_fast_some_come_to_their_end() -> None:
     """A slider that moves without a pause would else show nothing until it rests."""
     worker = Worker(lambda error: None, lambda stage, share: None)
@@ -175,7 +180,7 @@ def test_of_quick_requests_that_follow_fast_some_come_to_their_end() -> None:
 
     assert worker.ask(first, quick=True) and begun.wait(PATIENCE)
     for number in (1, 2, 3):
-        assert worker.ask(lambda progress, number=number: done.append(number), quick=True)
+        assert worker.ask(partial(_note, done, number), quick=True)
     go.set()
     assert worker.wait(PATIENCE) and done == [0, 3]  # what runs, then the newest
 
@@ -201,7 +206,9 @@ def test_a_run_that_goes_on_with_another_waits_for_it(refused: bool) -> None:
     go.set()
     assert worker.wait(PATIENCE)
     assert done == (["grid"] if refused else ["grid", "structure"])
-    assert [type(each) for each in told] == ([st.InputError] if refused else [type(None)] * 2)  # which stays on the page
+    assert [type(each) for each in told] == (
+        [st.InputError] if refused else [type(None)] * 2
+    )  # which stays on the page
 
 
 @pytest.mark.parametrize("content", [b"", b"PK\x03\x04", b"text"])

@@ -251,9 +251,9 @@ def test_a_crop_keeps_the_cleaning_and_the_command_line_does_the_same(
     assert session.worker.wait(120)
     session.clean()
     session.crop((box, "box:3,1,-1,7,6,10"))
-    assert session.state.cleaning is not None  # what is left was looked at
+    assert session.state.cleaning is not None and session.state.whole is not None  # what is left was looked at
     session.crop(())
-    assert session.state.cleaning is None and session.history.words[0] == "no crop, not cleaned"
+    assert session.history.words[0] == "no crop, not cleaned" and session.cloud is session.state.whole.cloud
 
 
 def test_the_first_view_shows_all_of_a_scan_and_little_more() -> None:

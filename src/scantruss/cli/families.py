@@ -4,26 +4,24 @@ from __future__ import annotations
 
 from argparse import Namespace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
+from ..grid.alike import JOINTS, LENGTHS, PANELS
 from .outputs import claim, outs_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-    from ..boundary.find import Boundary
     from ..grid.grid import Grid
     from ..layouts.alike import PartKinds
     from ..layouts.families import Families
-    from ..settings import Settings
-    from ..surface.samples import SurfaceSamples
+    from ..layouts.on_scan import ScanOfGrid
     from .options import Parser
 
     OffScan = Callable[[Grid], float] | None
     Outcome = tuple[dict[str, Any], list[str], Callable[[], bytes]]
 
-LENGTHS, JOINTS, PANELS = "lengths", "joints", "panels"  # what shall be alike
 USUAL_LENGTHS = 12  # that are aimed at
 WARNED_OFF_SCAN = 0.05  # distance of a node from the scan that is warned of beyond [mean members]
 MIRROR_IMAGES = ("different", "same")  # what mirror images are
@@ -120,7 +118,7 @@ def families(values: Namespace) -> None:
         check_passed(before, values.keep_failed)
         bars("families", 0.1)
         found = _alike(before, values)
-        scan = _Scan.of_grid(before, values) if values.scan else None
+        scan = _scan_of(before, values) if values.scan else None
         made = scan.certified(found.grid, keep_failed=values.keep_failed) if scan else found.grid
         off_scan = scan and scan.farthest_node
         if isinstance(found, Families):
@@ -136,51 +134,14 @@ def families(values: Namespace) -> None:
     print_lines([*words, *_after(values), f"wrote {' '.join(map(str, wrote))}"])
 
 
-class _Scan(NamedTuple):
-    """The scan that a grid is compared with."""
+def _scan_of(grid: Grid, values: Namespace) -> ScanOfGrid:
+    """Read the scan with the settings of a grid."""
+    from ..layouts.on_scan import ScanOfGrid
+    from ..scan.formats.reading import read_points
 
-    samples: SurfaceSamples
-    boundary: Boundary
-    settings: Settings
-
-    @classmethod
-    def of_grid(cls, grid: Grid, values: Namespace) -> _Scan:
-        """Read the scan with the settings of a grid."""
-        from ..boundary.find import find_boundary
-        from ..cells.make import settings_of_triangles
-        from ..scan.formats.reading import read_points
-        from ..surface.samples import sample_surface
-
-        if (settings := grid.settings) is None:
-            raise InputError(f"{values.grid} does not say with which settings it was made; leave --scan out")
-        cloud = read_points(values.scan, settings.unit, settings.selection)
-        plain = settings_of_triangles(settings)
-        return cls(*find_boundary(sample_surface(cloud, plain), plain), settings)
-
-    def at_scan(self, grid: Grid) -> Grid:
-        """Return a grid with the origin of the scan."""
-        return grid.replace(nodes=grid.nodes + (grid.origin - self.samples.origin), origin=self.samples.origin)
-
-    def certified(self, grid: Grid, *, keep_failed: bool) -> Grid:
-        """Return a grid with a certificate of the scan."""
-        from ..cells.make import judging_settings
-        from ..check.certify import certify
-        from ..grid.certificate import check_passed
-
-        moved = self.at_scan(grid)
-        certificate = certify(moved, self.samples, self.boundary, judging_settings(self.settings))
-        moved = moved.replace(certificate=certificate)
-        check_passed(moved, keep_failed)
-        return moved
-
-    def farthest_node(self, grid: Grid) -> float:
-        """Return the largest distance of a node of a grid from the scan [unit of the grid]."""
-        import numpy as np
-
-        from ..check.distances import distances_to_points
-
-        _, nodes, _ = distances_to_points(self.at_scan(grid), self.samples, self.settings.length)
-        return float(np.nanmax(nodes))
+    if (settings := grid.settings) is None:
+        raise InputError(f"{values.grid} does not say with which settings it was made; leave --scan out")
+    return ScanOfGrid.of(read_points(values.scan, settings.unit, settings.selection), settings)
 
 
 def _alike(before: Grid, values: Namespace) -> Families | PartKinds:
@@ -205,28 +166,37 @@ def _lengths_wanted(values: Namespace) -> int:
 
 def _of_lengths(before: Grid, found: Families, values: Namespace, off_scan: OffScan) -> Outcome:
     """Return the figures of lengths, the same in words, and what draws them."""
-    from ..export.drawing.families import encode_families
+    from ..export.drawing.families import encode_lengths
     from ..layouts.families import family_report
+    from ..layouts.trade import traded_lengths
 
     figures = family_report(before, found, values.tolerance)
-    return figures, _words(figures), lambda: encode_families(before, values.tolerance, off_scan=off_scan)
+
+    def picture() -> bytes:
+        trade = list(traded_lengths(before, values.tolerance, off_scan=off_scan))
+        return encode_lengths(trade, None if off_scan is None else off_scan(before) / float(before.lengths.mean()))
+
+    return figures, _words(figures), picture
 
 
 def _of_kinds(before: Grid, found: PartKinds, values: Namespace, off_scan: OffScan) -> Outcome:
     """Return the figures of joints or panels, the same in words, and what draws them."""
     from ..export.drawing.families import encode_kinds
-    from ..layouts.alike import kinds_report, trade_of
+    from ..layouts.alike import kinds_report
+    from ..layouts.trade import Traded, traded_kinds
 
     figures = kinds_report(before, found, values.tolerance)
+    trade: list[Traded] = []
     if values.report is not None or values.plot is not None:
-        figures["trade"] = trade_of(before, found, off_scan)
+        trade = traded_kinds(before, found, off_scan)
+        figures["trade"] = [each.to_dict() for each in trade]
     words = _words_of_kinds(figures, values.parts)
     far = 0.0 if off_scan is None else off_scan(found.grid) / float(before.lengths.mean())
     if far > WARNED_OFF_SCAN:
         words.append(
             f"warning: a node is {far:.2g} members off the scan; more kinds, by --count, keep nodes nearer: see the trade of --report"
         )
-    return figures, words, lambda: encode_kinds(figures["trade"], values.parts)
+    return figures, words, lambda: encode_kinds(trade, values.parts)
 
 
 def _words(figures: dict[str, Any]) -> list[str]:

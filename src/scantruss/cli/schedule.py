@@ -8,10 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..errors import InputError, words_of_number
+from ..grid.alike import JOINTS, PANELS
 from .grids import add_grid, read_grid_or_structure
 from .outputs import claim, outs_of, wrote_line
 
 if TYPE_CHECKING:
+    from ..grid.alike import Alike
     from ..schedules.records import Schedule, Schedules
     from ..schedules.settings import ScheduleSettings
     from .options import Parser
@@ -145,17 +147,20 @@ def make_schedule(values: Namespace) -> None:
         for number, out in enumerate(outs):
             bars("write", number / len(outs))
             files[out] = len(write_schedules(made, save.beside(out)))
-    print_lines([*schedule_lines(made, settings), wrote_line(files)])
+    print_lines([*schedule_lines(made, settings, getattr(what, "alike", None)), wrote_line(files)])
 
 
-def schedule_lines(made: Schedules, settings: ScheduleSettings) -> list[str]:
-    """Say how much there is of what, and what is warned of."""
+def schedule_lines(made: Schedules, settings: ScheduleSettings, alike: Alike | None = None) -> list[str]:
+    """Say how much there is of what, and what is warned of; `alike` says which parts were made so."""
+    within = {JOINTS: f"{settings.angle_tolerance:g} degrees", PANELS: f"{settings.tolerance:g} mm"}
+    if alike is not None and alike.parts in within:
+        within[alike.parts] = f"{100 * alike.tolerance:g} %, as they were made alike"
     cut = sum(value for value in made.lengths["total"] if isinstance(value, float))
     lines = [
-        f"{len(made.nodes):,} nodes of {len(made.node_types):,} types within {settings.angle_tolerance:g} degrees"
+        f"{len(made.nodes):,} nodes of {len(made.node_types):,} types within {within[JOINTS]}"
         + mirrored_words(made.node_types),
         f"{len(made.members):,} members of {len(made.lengths):,} lengths within {settings.tolerance:g} mm, cut {words_of_number(cut, 4)} m",
-        f"{len(made.panels):,} panels of {len(made.panel_types):,} types within {settings.tolerance:g} mm"
+        f"{len(made.panels):,} panels of {len(made.panel_types):,} types within {within[PANELS]}"
         + mirrored_words(made.panel_types),
     ]
     return [*lines, *warning_lines(made.warnings)]

@@ -18,6 +18,7 @@ import numpy as np
 
 from .. import __version__
 from ..errors import FormatError, InputError
+from ..grid.alike import Alike
 from ..grid.certificate import Certificate
 from ..grid.grid import Grid
 from ..grid.line_sets import FIXED_LINE, RIDGE, LineSet, sets_of
@@ -67,6 +68,8 @@ def encode_json(grid: Grid) -> bytes:
     }
     if grid.panels is not None:
         values["panels"] = grid.panel_loops
+    if grid.alike is not None:
+        values["alike"] = grid.alike.to_dict()
     if grid.desired is not None:
         values["desired"] = np.asarray(grid.desired, float).tolist()
     parts = [
@@ -180,7 +183,7 @@ def _grid_from(values: dict[str, Any]) -> Grid:
     desired = values.get("desired")
     if desired is not None and len(desired) != len(nodes):
         raise ValueError(f"{len(desired)} desired lengths for {len(nodes)} nodes")
-    settings, before, certificate = (values.get(name) for name in ("settings", "before", "certificate"))
+    settings, before, certificate, alike = (values.get(name) for name in ("settings", "before", "certificate", "alike"))
     return Grid(
         nodes=nodes,
         triangles=triangles,
@@ -199,6 +202,7 @@ def _grid_from(values: dict[str, Any]) -> Grid:
         settings=None if settings is None else Settings.from_dict(settings),
         before=None if before is None else GridQuality(**before, unit=unit),
         certificate=None if certificate is None else Certificate.from_dict(certificate),
+        alike=None if alike is None else Alike(**alike),
     )
 
 

@@ -10,9 +10,11 @@ import numpy as np
 
 from ..check.folds import fold_angles
 from ..errors import words_of_number
+from ..grid.alike import JOINTS, PANELS
 from ..grid.certificate import Certificate
 from ..grid.grid import Grid
 from ..grid.panels import planarity_of, shape_qualities_of, side_lengths_of
+from ..layouts.kinds import families_of_grid, kinds_of_grid
 from .drawing.structure import OVERUSED
 from .model import Model
 
@@ -22,6 +24,9 @@ COLORINGS: tuple[tuple[str, str, str, float | None], ...] = (  # kind, column, w
     ("members", "length", "member length", None),
     ("members", "length / desired", "length over the desired length", 1.0),
     ("members", "fold", "angle between the panels, 180 where level", None),
+    ("members", "family", "family of lengths, shortest first", None),
+    ("panels", "kind", "kind of panel, the most frequent first", None),
+    ("nodes", "kind", "kind of joint, the most frequent first", None),
     ("panels", "quality", "quality of triangles, 1 equilateral", None),
     ("nodes", "members", "members at a node", None),
     ("nodes", "distance from scan", "distance of nodes from the scan", None),
@@ -91,6 +96,8 @@ def tables_of(model: Model) -> Tables:
     elif model.grid is not None:
         nodes += _of_grid(model.grid)
         members += _members_of_grid(model.grid)
+        nodes += _kinds_of_grid(model.grid, JOINTS)
+        panels += _kinds_of_grid(model.grid, PANELS)
     return {"nodes": nodes, "members": members, "panels": panels}
 
 
@@ -112,7 +119,19 @@ def _members_of_grid(grid: Grid) -> list[PageColumn]:
     if grid.desired is not None or grid.settings is not None:
         length = grid.settings.length if grid.settings is not None else 1.0
         columns.insert(0, column("length / desired", "", grid.stretches(length)))
+    if (families := families_of_grid(grid)) is not None:
+        columns.append(column("family", "", 1 + families[1]))
     return columns
+
+
+def _kinds_of_grid(grid: Grid, parts: str) -> list[PageColumn]:
+    """Return the kinds of joints or panels, from 1, where they were made alike."""
+    found = kinds_of_grid(grid, parts)
+    if found is None:
+        return []
+    rank = np.argsort(np.argsort(-np.bincount(found.of[found.of >= 0]), kind="stable"), kind="stable")
+    kinds = np.where(found.of >= 0, 1 + rank[found.of], -1).tolist()
+    return [column("kind", "", [each if each > 0 else None for each in kinds])]
 
 
 def _of_structure(model: Model) -> list[PageColumn]:

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
     from ..scan.cloud import PointCloud
     from ..settings import Settings
+    from .alike import Alike
     from .certificate import Certificate
 
 
@@ -31,6 +32,7 @@ PROVENANCE = {
     "settings",
     "before",
     "certificate",
+    "alike",
     "seconds",
     "line_sets",
 }  # fields that no figure of a grid depends on
@@ -63,6 +65,7 @@ class Grid(GridTables):
     settings: Settings | None = None  #: what the grid was made with
     before: GridQuality | None = None  #: quality before the optimization (Table 2)
     certificate: Certificate | None = None  #: what was checked against the scan
+    alike: Alike | None = None  #: which of its parts were made alike
     seconds: dict[str, float] = field(default_factory=dict)  #: time of each stage [s]; never written with the grid
 
     def __repr__(self) -> str:
@@ -82,12 +85,12 @@ class Grid(GridTables):
         return CELL_NAMES[self.cells]
 
     def replace(self, **changes: Any) -> Grid:
-        """Return a copy with some fields changed; a certificate holds only for the nodes and triangles it was made of.
+        """Return a copy with some fields changed; a certificate, and what is alike, hold only for the nodes and triangles of before.
 
         What has been measured goes along where it is the same.
         """
         if not changes.keys().isdisjoint(("nodes", "triangles", "fixed", "origin")):
-            changes = {"certificate": None, **changes}
+            changes = {"certificate": None, "alike": None, **changes}
         if "triangles" in changes:
             changes = {"panels": None, **changes}
         copy = replace(self, **changes)

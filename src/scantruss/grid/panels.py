@@ -157,11 +157,16 @@ def shape_qualities_of(nodes: np.ndarray, panels: np.ndarray) -> np.ndarray:
 
 def planarity_of(nodes: np.ndarray, panels: np.ndarray) -> np.ndarray:
     """Return the largest distance of a corner of each panel from its mean plane, over its mean diagonal (P,)."""
+    off = np.abs(np.nan_to_num(heights_of(nodes, panels))).max(axis=1)
+    return off / np.maximum(diagonals_of(nodes, panels), 1e-300)
+
+
+def heights_of(nodes: np.ndarray, panels: np.ndarray) -> np.ndarray:
+    """Return how far outside of its mean plane each node of a panel lies (P, K), NaN where it has no such node [scan unit]."""
     normal = area_vectors_of(nodes, panels)
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
     way = nodes[panels] - _middles(nodes, panels)[:, None]
-    off = np.where(panels >= 0, np.abs((way * normal[:, None]).sum(axis=2)), 0.0).max(axis=1)
-    return off / np.maximum(diagonals_of(nodes, panels), 1e-300)
+    return np.where(panels >= 0, (way * normal[:, None]).sum(axis=2), np.nan)
 
 
 def diagonals_of(nodes: np.ndarray, panels: np.ndarray) -> np.ndarray:

@@ -11,10 +11,12 @@ from scipy.sparse import coo_matrix, diags
 from scipy.sparse.linalg import spsolve
 
 from ..errors import InputError
+from ..grid.alike import Alike
 from ..grid.grid import Grid
-from ..grid.panels import triangles_of
+from ..runtime.progress import Progress
 from .charts import Charts, shortened
 from .images import Images
+from .moved import moved_grid
 from .part_vectors import APART, PartVectors
 
 REGULAR_ROUNDS = (12, 24)  #: in which all parts that may be alike are drawn to one kind, before each further descent
@@ -26,8 +28,6 @@ STIFFNESS_OF_NODE = 0.02  #: weight of staying where one is
 STIFFNESS_OF_PARTS = 0.004  #: the same over all that pulls at a node
 STEP_OF_NODE = 0.05  #: farthest move of a node in one round, over the mean member
 WEIGHT_WITHIN = 0.3  #: weight of a part within the tolerance
-MISFIT_BISECTIONS = 20  #: of the least misfit
-MOST_STAGES = 8  #: in the trade of kinds, of all that were on the way
 LEAST_MISFIT, MOST_MISFIT = 1e-4, 0.2  #: of parts that are alike
 
 
@@ -64,7 +64,9 @@ class PartKinds:
     moved: np.ndarray  #: (V,) how far each node has moved [unit of the grid]
     parts: PartVectors
     mirror_images_alike: bool
-    stages: tuple[Stage, ...]  #: the grid as it was, and each time on the way that there were fewer kinds
+    stages: tuple[
+        Stage, ...
+    ]  #: the grid as it was, and those with which larger counts end, each of fewer kinds, to this one
 
     @property
     def before(self) -> int:
@@ -89,7 +91,7 @@ def check_alike(grid: Grid, tolerance: float, count: int, parts: str, number: in
         raise InputError(f"of {MOST_ALIKE:,} {parts} at most few kinds are made, got {number:,}")
 
 
-def few_kinds(grid: Grid, parts: PartVectors, tolerance: float, count: int, *, mirrored: bool) -> PartKinds:
+def few_kinds(grid: Grid, parts: PartVectors, asked: Alike, progress: Progress | None = None) -> PartKinds:
     """Return the grid with its nodes moved along its surface so that its parts are of few kinds.
 
     Each round gives every part the nearest of some of the kinds that hold the most, and moves the nodes by a damped Gauss-Newton step that
@@ -102,38 +104,56 @@ def few_kinds(grid: Grid, parts: PartVectors, tolerance: float, count: int, *, m
     grid : Grid
     parts : PartVectors
         Of the grid.
-    tolerance : float
-        Largest root mean square of what is between the vectors of two parts of one kind.
-    count : int
-        Kinds with which it ends.
-    mirrored : bool
-        Whether mirror images are of one kind.
+    asked : Alike
+        Its tolerance is the largest root mean square of what is between the vectors of two parts of one kind.
+    progress : callable, optional
+        Called before each round with what the parts are and the share of the work that is done at least; it may raise to cancel.
     """
-    descent = _Descent(parts, Charts.of_grid(grid), Images.of_grid(grid), tolerance, mirrored)
+    rounds, done = (1 + len(REGULAR_ROUNDS)) * ALIKE_ROUNDS, 0
+
+    def turned() -> None:
+        nonlocal done
+        if progress:
+            progress(asked.parts, min(done / rounds, 1.0))
+        done += 1
+
+    descent = _Descent(parts, Charts.of_grid(grid), Images.of_grid(grid), asked.tolerance, asked.mirrored, turned)
     start = descent.at(grid.nodes).stage()
-    found, first = [_fewest(descent, start, count)], grid.nodes
-    for rounds in REGULAR_ROUNDS:
-        if len(found[-1][-1].kinds) <= count:
+    found, first = [_fewest(descent, start, asked.count)], grid.nodes
+    for rounds_of_start in REGULAR_ROUNDS:
+        if len(found[-1][-1].kinds) <= asked.count:
             break
-        first = descent.regular(first, rounds)
-        found.append(_fewest(descent, descent.at(first).stage(), count))
-    best = min(found, key=lambda each: len(each[-1].kinds))
-    return _found(grid, descent, [start, *(each for each in best if len(each.kinds) < len(start.kinds))])
+        first = descent.regular(first, rounds_of_start)
+        found.append(_fewest(descent, descent.at(first).stage(), asked.count))
+    return _found(grid, descent, asked, [start, *_ends(found, len(start.kinds))])
+
+
+def _ends(found: list[list[Stage]], before: int) -> list[Stage]:
+    """Return the stages with which counts below that of the grid as it was end: of the first start that comes so far."""
+    ends: list[Stage] = []
+    least = min(len(each[-1].kinds) for each in found)
+    count = before - 1
+    while count >= least:  # ends: each turn takes a stage of at most so many kinds, and goes on below
+        stage = next(stage for each in found for stage in each if len(stage.kinds) <= count)
+        ends.append(stage)
+        count = len(stage.kinds) - 1
+    return ends
 
 
 def _fewest(descent: _Descent, start: Stage, count: int) -> list[Stage]:
-    """Return the stages from a start on, each of fewer kinds."""
+    """Return the start, and the stage after each way that has come to fewer kinds."""
     stages = [start]
     rounds = failed = 0
     while (
         len(stages[-1].kinds) > count and failed < len(WAYS_TO_FEWER) and rounds < ALIKE_ROUNDS
     ):  # ends: each turn is a round at least
-        before = stages[-1]
+        before = best = stages[-1]
         for state in descent.along(before.nodes, WAYS_TO_FEWER[failed]):
             rounds += 1
-            if len(state.kinds) < len(stages[-1].kinds):
-                stages.append(state.stage())
-        failed = failed + 1 if stages[-1] is before else 0
+            if len(state.kinds) < len(best.kinds):
+                best = state.stage()
+        failed = failed + 1 if best is before else 0
+        stages += [] if best is before else [best]
     return stages
 
 
@@ -160,12 +180,13 @@ class _Descent(NamedTuple):
     images: Images
     tolerance: float
     mirrored: bool
+    turned: Callable[[], None]  #: called before each round
 
     def at(self, nodes: np.ndarray) -> _State:
         """Return how alike the parts are of some nodes."""
         vectors = self.parts.vectors(nodes)
         misfit, shift = self.parts.misfits(vectors, np.arange(len(vectors)), mirrored=self.mirrored)
-        return _State(nodes, vectors, misfit, shift, _kinds(misfit <= self.tolerance, self.parts.count > 0))
+        return _State(nodes, vectors, misfit, shift, fewest_kinds(misfit <= self.tolerance, self.parts.count > 0))
 
     def regular(self, nodes: np.ndarray, rounds: int) -> np.ndarray:
         """Return where nodes (V, 3) are after parts of as many vectors have been drawn to one kind."""
@@ -197,6 +218,7 @@ class _Descent(NamedTuple):
         self, state: _State, wanted: np.ndarray, within: np.ndarray, weight: np.ndarray, enough: float
     ) -> _State:
         """Return the state after all parts have been drawn to the nearest of some kinds, the mean of those within."""
+        self.turned()
         near = state.misfit[:, wanted].argmin(axis=1)
         shift = state.shift[np.arange(len(near)), wanted[near]]
         pull = _aims(self.parts, state.vectors, near, shift, within, len(wanted)) - state.vectors
@@ -205,44 +227,6 @@ class _Descent(NamedTuple):
         place = self.charts.place_of(state.nodes)
         place = self.charts.within(place + _step(self.parts, self.charts, place, pull, weight))
         return self.at(self.images.alike(self.charts.moved(place)))
-
-
-def trade_of(before: Grid, found: PartKinds, off_scan: Callable[[Grid], float] | None = None) -> list[dict[str, Any]]:
-    """Return stages, eight at most: kinds against misfit, moves, distance from the scan and evenness; moves over the mean member.
-
-    The plain misfit is that with which the grid as it was would be of so many kinds, by bisection.
-
-    Parameters
-    ----------
-    before : Grid
-    found : PartKinds
-        Of that grid.
-    off_scan : function, optional
-        Largest distance of the nodes of a grid from the scan [unit of the grid].
-    """
-    which = np.unique(np.linspace(0, len(found.stages) - 1, MOST_STAGES).round().astype(int))
-    mean = float(before.lengths.mean())
-    nodes = found.stages[0].nodes
-    misfit, _ = found.parts.misfits(
-        found.parts.vectors(nodes), np.arange(len(found.of)), mirrored=found.mirror_images_alike
-    )
-    trade = []
-    for stage in (found.stages[k] for k in which):
-        low, high = 0.0, APART
-        for _ in range(MISFIT_BISECTIONS):
-            middle = (low + high) / 2
-            few = len(_kinds(misfit <= middle, found.parts.count > 0)) <= len(stage.kinds)
-            low, high = (low, middle) if few else (middle, high)
-        grid = before.replace(nodes=stage.nodes, deviation=None)
-        each = {
-            "kinds": len(stage.kinds),
-            "misfit_max": stage.misfit,
-            "plain_misfit_max": high,
-            "moved_max": float(np.linalg.norm(stage.nodes - nodes, axis=1).max()) / mean,
-            "length_cv": grid.quality.length_cv,
-        }
-        trade.append(each | ({} if off_scan is None else {"off_scan_max": off_scan(grid) / mean}))
-    return trade
 
 
 def kinds_report(before: Grid, found: PartKinds, tolerance: float) -> dict[str, Any]:
@@ -269,7 +253,7 @@ def kinds_report(before: Grid, found: PartKinds, tolerance: float) -> dict[str, 
     }
 
 
-def _kinds(near: np.ndarray, used: np.ndarray) -> np.ndarray:
+def fewest_kinds(near: np.ndarray, used: np.ndarray) -> np.ndarray:
     """Return parts that stand for all that are used, each time that which the most others are near to (N, N)."""
     near = near | np.eye(len(used), dtype=bool)  # whatever the rounding
     held = (near & used).sum(axis=1) * used  # how many of the parts left each is near to
@@ -353,21 +337,41 @@ def _without_turns(rows: np.ndarray, vectors: np.ndarray) -> np.ndarray:
     return np.asarray(rows - basis @ (np.linalg.pinv(transposed @ basis, hermitian=True) @ (transposed @ rows)))
 
 
-def _found(grid: Grid, descent: _Descent, stages: list[Stage]) -> PartKinds:
-    """Return the record of the grid of the last stage."""
-    nodes, kinds, _ = stages[-1]
-    parts = descent.parts
-    made = grid.replace(nodes=nodes, deviation=None)
-    if made.panels is not None:  # which are cut along their shortest diagonals
-        made = made.replace(triangles=triangles_of(nodes, made.panels), panels=made.panels)
-    misfit, shift = parts.misfits(parts.vectors(nodes), kinds, mirrored=descent.mirrored)
+class Kinds(NamedTuple):
+    """Parts of a grid by kind."""
+
+    representative: np.ndarray  #: (K,) part that stands for each kind, that which the most are of first
+    of: np.ndarray  #: (N,) kind of each part, -1 of a node without members
+    mirrored: np.ndarray  #: (N,) bool, whether it is the mirror image of its kind
+    misfit: np.ndarray  #: (N,) to the representative of its kind
+
+
+def kinds_of_parts(parts: PartVectors, nodes: np.ndarray, tolerance: float, *, mirrored: bool) -> Kinds:
+    """Return the kinds of the parts of a grid with nodes (V, 3): each time that which the most others are within the tolerance of."""
+    vectors = parts.vectors(nodes)
+    misfit, _ = parts.misfits(vectors, np.arange(len(vectors)), mirrored=mirrored)
+    return _sorted(parts, nodes, fewest_kinds(misfit <= tolerance, parts.count > 0), mirrored=mirrored)
+
+
+def _sorted(parts: PartVectors, nodes: np.ndarray, kinds: np.ndarray, *, mirrored: bool) -> Kinds:
+    """Return all parts by the nearest of some kinds."""
+    misfit, shift = parts.misfits(parts.vectors(nodes), kinds, mirrored=mirrored)
     near, used = misfit.argmin(axis=1), parts.count > 0
-    return PartKinds(
-        grid=made,
+    return Kinds(
         representative=kinds,
         of=np.where(used, near, -1),
         mirrored=used & (shift[np.arange(len(near)), near] >= parts.count),
         misfit=np.where(used, misfit.min(axis=1), 0.0),
+    )
+
+
+def _found(grid: Grid, descent: _Descent, asked: Alike, stages: list[Stage]) -> PartKinds:
+    """Return the record of the grid of the last stage."""
+    nodes, kinds, _ = stages[-1]
+    parts = descent.parts
+    return PartKinds(
+        **_sorted(parts, nodes, kinds, mirrored=descent.mirrored)._asdict(),
+        grid=moved_grid(grid, nodes, asked),
         moved=np.linalg.norm(nodes - grid.nodes, axis=1),
         parts=parts,
         mirror_images_alike=descent.mirrored,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -11,10 +12,12 @@ from scipy.sparse import coo_matrix, diags
 from scipy.sparse.linalg import spsolve
 
 from ..errors import InputError
+from ..grid.alike import LENGTHS, Alike
 from ..grid.grid import Grid
-from ..grid.panels import triangles_of
+from ..runtime.progress import Progress
 from .charts import Charts, shortened
 from .images import Images
+from .moved import moved_grid
 
 FAMILY_ROUNDS = 300  #: of assignment and relaxation, each way but the last, which takes three times as many
 INNER_SHARE = 0.9  #: of the tolerance, within which a length is taken to be that of its family
@@ -83,7 +86,7 @@ def _middles(lengths: np.ndarray, tolerance: float, count: int, enough: int) -> 
     return np.array(middles)
 
 
-def few_lengths(grid: Grid, tolerance: float, count: int) -> Families:
+def few_lengths(grid: Grid, tolerance: float, count: int, progress: Progress | None = None) -> Families:
     """Return the grid with its nodes moved along its surface so that more members are of `count` lengths.
 
     The surface is a quadric at each node, of least squares through its neighbours and theirs; nodes of the boundary and of lines move along
@@ -102,6 +105,8 @@ def few_lengths(grid: Grid, tolerance: float, count: int) -> Families:
         Largest misfit, over the mean member, 0.0001 to 0.2.
     count : int
         Lengths, 1 or more.
+    progress : callable, optional
+        Called before each round with the stage "lengths" and the share of the work that is done at least; it may raise to cancel.
 
     Raises
     ------
@@ -117,19 +122,37 @@ def few_lengths(grid: Grid, tolerance: float, count: int) -> Families:
     charts, images, aim = Charts.of_grid(grid), Images.of_grid(grid), _Number(math.ceil(LARGE_FAMILIES * count), count)
     start = place = np.zeros((len(grid.nodes), 2))
     off = math.inf
+    rounds, done = sum(way.total for way in WAYS_TRIED), 0
+
+    def turned() -> None:
+        nonlocal done
+        if progress:
+            progress(LENGTHS, done / rounds)
+        done += 1
+
     for way in WAYS_TRIED:
-        tried, missed = _relaxed(grid, charts, images, tolerance, aim, place if way.onwards else start, way)
+        tried, missed = _relaxed(grid, charts, images, tolerance, aim, place if way.onwards else start, way, turned)
         if missed < off:
             place, off = tried, missed
         if not 0 < off < OUT_OF_REACH:
             break
     nodes = images.alike(charts.moved(place)) if place.any() else grid.nodes
-    made = grid.replace(nodes=nodes, deviation=None)
-    if made.panels is not None:  # which are cut along their shortest diagonals
-        made = made.replace(triangles=triangles_of(nodes, made.panels), panels=made.panels)
-    middles = _middles(made.lengths, tolerance * charts.mean, count, len(made.lengths))
-    of = np.abs(made.lengths[:, None] - middles).argmin(axis=1)
+    made = moved_grid(grid, nodes, Alike(LENGTHS, tolerance, count, charts.mean))
+    middles, of = families_of(made.lengths, tolerance * charts.mean, count)
     return Families(made, middles, of, made.lengths - middles[of], np.linalg.norm(nodes - grid.nodes, axis=1))
+
+
+def families_of(lengths: np.ndarray, tolerance: float, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the lengths of families (K,), `count` at most, and the family of each member (E,).
+
+    Parameters
+    ----------
+    lengths : (E,) float64
+    tolerance : float
+        In their unit.
+    """
+    middles = _middles(lengths, tolerance, count, len(lengths))
+    return middles, np.abs(lengths[:, None] - middles).argmin(axis=1)
 
 
 def least_misfit(lengths: np.ndarray, count: int) -> float:
@@ -203,7 +226,14 @@ class _Number(NamedTuple):
 
 
 def _relaxed(
-    grid: Grid, charts: Charts, images: Images, tolerance: float, aim: _Number, place: np.ndarray, way: _Way
+    grid: Grid,
+    charts: Charts,
+    images: Images,
+    tolerance: float,
+    aim: _Number,
+    place: np.ndarray,
+    way: _Way,
+    turned: Callable[[], None],
 ) -> tuple[np.ndarray, float]:
     """Return the places (V, 2) on the charts of the best round, and the share of members by which it misses the aim."""
     width = tolerance * charts.mean
@@ -212,6 +242,7 @@ def _relaxed(
     weight = np.full(len(lengths), LEAST_WEIGHT)
     now = _fewer(lengths, width, aim) if way.one_by_one else aim
     for _ in range(way.total):
+        turned()
         if (missed := _missed(lengths, width, aim)) < least:
             best, least = place, missed
         if missed == 0:

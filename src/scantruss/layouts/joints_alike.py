@@ -7,7 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
+from ..grid.alike import JOINTS, Alike
 from ..grid.grid import Grid
+from ..runtime.progress import Progress
 from .alike import PartKinds, check_alike, few_kinds
 from .part_vectors import PartVectors
 
@@ -19,7 +21,13 @@ HOLD_OF_LENGTH = 10.0  #: weight of what is beyond, over that of a direction
 
 
 def few_joints(
-    grid: Grid, tolerance: float = 0.01, count: int = 1, *, mirrored: bool = False, uneven: float = USUAL_UNEVENNESS
+    grid: Grid,
+    tolerance: float = 0.01,
+    count: int = 1,
+    *,
+    mirrored: bool = False,
+    uneven: float = USUAL_UNEVENNESS,
+    progress: Progress | None = None,
 ) -> PartKinds:
     """Return the grid with its nodes moved along its surface so that there are few different joints.
 
@@ -39,6 +47,8 @@ def few_joints(
     uneven : float
         By how much members may differ from the mean one, over it, 0 to 0.9; those that did before stay as they were. They are held by a
         weight, and may exceed it by a hundredth.
+    progress : callable, optional
+        See `few_kinds`.
 
     Raises
     ------
@@ -48,7 +58,8 @@ def few_joints(
     check_alike(grid, tolerance, count, "joints", len(grid.nodes))
     if not 0.0 <= uneven <= MOST_UNEVEN:
         raise InputError(f"members can differ from the mean one by 0% to 90% of it, got {uneven!r}")
-    return few_kinds(grid, stars_of(grid, uneven), tolerance, count, mirrored=mirrored)
+    asked = Alike(JOINTS, tolerance, count, float(grid.lengths.mean()), mirrored, uneven)
+    return few_kinds(grid, stars_of(grid, uneven), asked, progress)
 
 
 @dataclass(frozen=True, eq=False)

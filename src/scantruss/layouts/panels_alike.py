@@ -6,13 +6,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..grid.alike import PANELS, Alike
 from ..grid.grid import Grid
 from ..grid.panels import sizes_of
+from ..runtime.progress import Progress
 from .alike import PartKinds, check_alike, few_kinds
 from .part_vectors import PartVectors
 
 
-def few_panels(grid: Grid, tolerance: float = 0.01, count: int = 1, *, mirrored: bool = False) -> PartKinds:
+def few_panels(
+    grid: Grid,
+    tolerance: float = 0.01,
+    count: int = 1,
+    *,
+    mirrored: bool = False,
+    progress: Progress | None = None,
+) -> PartKinds:
     """Return the grid with its nodes moved along its surface so that there are few different panels.
 
     Two panels are of one kind if one, laid on the other whatever way it is turned, has its corners within the tolerance of those of the
@@ -28,6 +37,8 @@ def few_panels(grid: Grid, tolerance: float = 0.01, count: int = 1, *, mirrored:
         Kinds that are few enough.
     mirrored : bool
         Whether mirror images are of one kind, as flat panels are that may be turned over.
+    progress : callable, optional
+        See `few_kinds`.
 
     Raises
     ------
@@ -35,7 +46,8 @@ def few_panels(grid: Grid, tolerance: float = 0.01, count: int = 1, *, mirrored:
         A value cannot be used, or the grid has no members or too many panels.
     """
     check_alike(grid, tolerance, count, "panels", len(grid.panel_table))
-    return few_kinds(grid, corners_of(grid), tolerance, count, mirrored=mirrored)
+    asked = Alike(PANELS, tolerance, count, float(grid.lengths.mean()), mirrored)
+    return few_kinds(grid, corners_of(grid), asked, progress)
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +73,8 @@ class Corners(PartVectors):
         return np.asarray(np.einsum("nwm,nmkc->nwcmk", shares, ways[self.nodes_of]))
 
 
-def corners_of(grid: Grid) -> Corners:
-    """Return the panels of a grid as vectors to their corners."""
+def corners_of(grid: Grid, member: float | None = None) -> Corners:
+    """Return the panels of a grid as vectors to their corners, over its mean member or a given one [unit of the grid]."""
     table = grid.panel_table
-    return Corners(table, sizes_of(table), np.zeros(len(table), np.int64), float(grid.lengths.mean()))
+    mean = float(grid.lengths.mean()) if member is None else member
+    return Corners(table, sizes_of(table), np.zeros(len(table), np.int64), mean)

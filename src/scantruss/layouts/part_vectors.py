@@ -58,6 +58,20 @@ class PartVectors(ABC):
         frame = np.stack([x, np.cross(normal, x), normal], axis=1)
         return np.ascontiguousarray(np.einsum("vwc,vkc->vwk", vectors, frame))
 
+    def image_misfits(self, vectors: np.ndarray, parts: np.ndarray) -> np.ndarray:
+        """Return misfits (C, C) of the mirror images of some parts to these."""
+        count, own = self.count[parts], self.own(vectors)[parts]
+        place = np.arange(own.shape[1])
+        back = np.where(place < count[:, None], count[:, None] - 1 - place, place)
+        images = np.take_along_axis(own, back[..., None], axis=1) * [1.0, -1.0, 1.0]
+        both = np.ascontiguousarray(np.concatenate([images, own]))
+        square = (both**2).sum(axis=(1, 2))
+        shape = len(both), len(parts)
+        misfit, shift = np.empty(shape), np.empty(shape, np.int16)
+        others = len(parts) + np.arange(len(parts))
+        turned_misfits(both, square, np.tile(count, 2), np.tile(self.is_open[parts], 2), others, False, misfit, shift)
+        return misfit[: len(parts)]
+
     def misfits(self, vectors: np.ndarray, others: np.ndarray, *, mirrored: bool) -> tuple[np.ndarray, np.ndarray]:
         """Return misfits and shifts (N, C) of all parts to some of them; see `turned_misfits`."""
         shape = len(self.count), len(others)

@@ -36,7 +36,7 @@ class Clusters:
         return order[np.cumsum(self.counts) - 1]
 
 
-def _sorted_by_count(of: np.ndarray, representative: np.ndarray, misfit: np.ndarray) -> Clusters:
+def sorted_by_count(of: np.ndarray, representative: np.ndarray, misfit: np.ndarray) -> Clusters:
     """Number the types by how many items they have; equal ones as they were found."""
     counts = np.bincount(of[of >= 0], minlength=len(representative))
     order = np.argsort(-counts, kind="stable")
@@ -67,7 +67,7 @@ def cluster_lengths(lengths: np.ndarray, tolerance: float, kind: np.ndarray | No
             representative.append(int(mine[middle]))
             begin = end
     found = np.array(representative, np.int64)
-    return _sorted_by_count(of, found, np.abs(lengths - lengths[found[of]]))
+    return sorted_by_count(of, found, np.abs(lengths - lengths[found[of]]))
 
 
 def _cluster(
@@ -108,31 +108,65 @@ def _cluster(
         found.setdefault((same, *cell), []).append(len(representative))
         of[item], misfit[item] = len(representative), 0.0
         representative.append(item)
-    return _sorted_by_count(of, np.array(representative, np.int64), misfit)
+    return sorted_by_count(of, np.array(representative, np.int64), misfit)
 
 
-def cluster_panels(sides: np.ndarray, tolerance: float, across: np.ndarray | None = None) -> Clusters:
-    """Return the types of panels by their sides, anticlockwise, wherever one begins; the misfit is that of the worst side.
+@dataclass(frozen=True, eq=False)
+class PanelSizes:
+    """What panels are compared by, node after node anticlockwise; NaN where a panel has no such node."""
+
+    sides: np.ndarray  #: (P, K) from node k to the next [mm]
+    across: np.ndarray | None = None  #: (P, K) from node k to node k + 2, of panels of more than three nodes [mm]
+    height: np.ndarray | None = None  #: (P, K) of node k over the mean plane, outwards, of the same [mm]
+
+    @property
+    def count(self) -> np.ndarray:
+        """(P,) nodes of each panel."""
+        return np.isfinite(self.sides).sum(axis=1)
+
+    @property
+    def all(self) -> list[np.ndarray]:
+        """What there is."""
+        return [each for each in (self.sides, self.across, self.height) if each is not None]
+
+    def mirrored(self, panels: np.ndarray) -> PanelSizes:
+        """Return the sizes of the mirror images of some panels, their nodes in the opposite order."""
+        count, place = self.count[panels][:, None], np.arange(self.sides.shape[1])
+
+        def back(values: np.ndarray | None, nodes: int) -> np.ndarray | None:
+            """Return what goes over so many nodes, from the other end."""
+            if values is None:
+                return None
+            taken = np.where(place < count, (-place - nodes) % count, place)
+            return np.take_along_axis(values[panels], taken, axis=1)
+
+        sides = back(self.sides, 1)
+        assert sides is not None
+        return PanelSizes(sides, back(self.across, 2), back(self.height, 0))
+
+
+def misfits_of_panels(mine: PanelSizes, item: int, theirs: PanelSizes, others: np.ndarray) -> np.ndarray:
+    """Return the largest difference (C,) of a panel to others of as many nodes, wherever the first begins [mm]."""
+    count = int(mine.count[item])
+    far = np.zeros((len(others), count))
+    for own, values in zip(mine.all, theirs.all, strict=True):
+        turned = np.stack([np.roll(own[item, :count], -k) for k in range(count)])
+        far = np.maximum(far, np.abs(values[others, None, :count] - turned).max(axis=2))
+    return np.asarray(far.min(axis=1))
+
+
+def cluster_panels(sizes: PanelSizes, tolerance: float) -> Clusters:
+    """Return the types of panels by their sizes, wherever one begins; the misfit is that of the worst.
 
     Parameters
     ----------
-    sides : (P, K) lengths, NaN where a panel has no such side [mm]
     tolerance : largest misfit of one type [mm]
-    across : (P, K) distances from node k to node k + 2 of panels of more than three nodes, which have to agree too
     """
-    size = np.isfinite(sides).sum(axis=1)
-    sizes = [sides] if across is None else [sides, across]
-
-    def misfits(item: int, others: np.ndarray) -> np.ndarray:
-        count = int(size[item])
-        far = np.zeros((len(others), count))
-        for values in sizes:
-            turned = np.stack([np.roll(values[item, :count], -k) for k in range(count)])
-            far = np.maximum(far, np.abs(values[others, None, :count] - turned).max(axis=2))
-        return far.min(axis=1)
-
-    keys = np.column_stack([size, *(np.nan_to_num(np.sort(values, axis=1)) for values in sizes)])
-    return _cluster(keys, tolerance, misfits, len(sides), np.arange(len(sides)))
+    number = len(sizes.sides)
+    keys = np.column_stack([sizes.count, *(np.nan_to_num(np.sort(values, axis=1)) for values in sizes.all)])
+    return _cluster(
+        keys, tolerance, lambda item, others: misfits_of_panels(sizes, item, sizes, others), number, np.arange(number)
+    )
 
 
 def cluster_polygons(polygons: list[np.ndarray], tolerance: float) -> Clusters:

@@ -10,15 +10,18 @@ import numpy as np
 
 from ..check.folds import fold_angles
 from ..errors import InputError
+from ..grid.alike import JOINTS, PANELS
 from ..grid.certificate import check_passed
 from ..grid.marks import member_marks, node_marks, panel_marks
-from ..grid.panels import across_of
+from ..grid.panels import across_of, heights_of
 from ..settings import UNITS
 from ..structure.truss import Truss
 from .bolts import NO_BOLTS, PITCHES, bolted_radii, choose_bolts
-from .clusters import Clusters, cluster_lengths, cluster_nodes, cluster_panels
+from .clusters import Clusters, PanelSizes, cluster_lengths, cluster_nodes, cluster_panels
 from .forces import Checked, Forces, find_forces, grid_of_structure
 from .joints import Joints, check_grid, clear_radii, find_joints
+from .kinds import TypesWithImages, types_of_kinds
+from .mirror_images import node_images, panel_images
 from .parts import Parts, Stock
 from .records import Column, Schedules, column
 from .tables import all_tables
@@ -82,12 +85,20 @@ def schedule(
     stock = _stock(grid, settings, forces)
     clear = clear_radii(joints, stock.width)
     needed = _needed(joints, stock.width, clear, settings)
-    node_types = cluster_nodes(joints, settings.angle_tolerance)
-    radius = np.where(joints.valence > 0, _radii(needed, node_types, settings.ball), 0.0)
+    if (nodes := types_of_kinds(grid, JOINTS)) is None:
+        node_types = cluster_nodes(joints, settings.angle_tolerance)
+        nodes = TypesWithImages(node_types, node_images(node_types, joints, settings.angle_tolerance))
+    radius = np.where(joints.valence > 0, _radii(needed, nodes.types, settings.ball), 0.0)
     length = grid.lengths * size
     cut = length - radius[grid.edges].sum(axis=1)
     members = grid.panel_members
-    sides = np.where(members >= 0, length[members], np.nan)
+    sizes = PanelSizes(np.where(members >= 0, length[members], np.nan))
+    if grid.panels is not None:
+        across, height = across_of(grid.nodes, grid.panels), heights_of(grid.nodes, grid.panels)
+        sizes = PanelSizes(sizes.sides, size * across, size * height)
+    if grid.alike is None or (panels := types_of_kinds(grid, PANELS, size * grid.alike.member)) is None:
+        panel_types = cluster_panels(sizes, settings.tolerance)
+        panels = TypesWithImages(panel_types, panel_images(panel_types, sizes, settings.tolerance))
     return all_tables(
         Parts(
             grid=grid,
@@ -103,12 +114,12 @@ def schedule(
             radius=radius,
             length=length,
             cut=cut,
-            sides=sides,
             fold=inner_folds(grid),
-            node_types=node_types,
-            panel_types=cluster_panels(
-                sides, settings.tolerance, None if grid.panels is None else size * across_of(grid.nodes, grid.panels)
-            ),
+            node_types=nodes.types,
+            node_images=nodes.image,
+            panel_sizes=sizes,
+            panel_types=panels.types,
+            panel_images=panels.image,
             length_types=cluster_lengths(cut, settings.tolerance, kind),
             node_marks=marks[0],
             member_marks=marks[1],

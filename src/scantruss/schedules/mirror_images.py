@@ -6,20 +6,22 @@ from dataclasses import replace
 
 import numpy as np
 
-from .clusters import Clusters, misfits_of_node
+from .clusters import Clusters, PanelSizes, misfits_of_node, misfits_of_panels
 from .joints import Joints
 
 NO_IMAGE = -1  # of a type without one among the types
 
 
-def panel_images(types: Clusters, sides: np.ndarray, tolerance: float) -> np.ndarray:
+def panel_images(types: Clusters, sizes: PanelSizes, tolerance: float) -> np.ndarray:
     """Return for each type of panel (K,) the one that is its mirror image within the tolerance, itself if it has an axis; else NO_IMAGE."""
-    own = sides[types.representative]
-    turned = np.stack([np.roll(own[:, ::-1], k, axis=1) for k in range(3)], axis=1)  # (K, 3, 3)
-    image = np.full(len(own), NO_IMAGE)
-    for k, each in enumerate(turned):
-        off = np.abs(own[:, None] - each).max(axis=2).min(axis=1)
-        image[k] = _chosen(off, k, tolerance)
+    one, count = types.representative, sizes.count[types.representative]
+    turned = sizes.mirrored(one)
+    image = np.full(len(one), NO_IMAGE)
+    for k in range(len(one)):
+        same = np.flatnonzero(count == count[k])
+        off = np.full(len(one), np.inf)
+        off[same] = misfits_of_panels(turned, k, sizes, one[same])
+        image[k] = image_of(off, k, tolerance)
     return image
 
 
@@ -34,11 +36,11 @@ def node_images(types: Clusters, joints: Joints, tolerance: float) -> np.ndarray
         near = np.flatnonzero((valence == valence[k]) & (np.abs(tilt - tilt[k]) <= tolerance))
         off = np.full(len(one), np.inf)
         off[near] = misfits_of_node(both, count + int(one[k]), one[near]).min(axis=1)
-        image[k] = _chosen(off, k, tolerance)
+        image[k] = image_of(off, k, tolerance)
     return image
 
 
-def _chosen(off: np.ndarray, own: int, tolerance: float) -> int:
+def image_of(off: np.ndarray, own: int, tolerance: float) -> int:
     """Return the type with the least misfit, the own one where it fits."""
     if off[own] <= tolerance:
         return own

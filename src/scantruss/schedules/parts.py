@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from .clusters import Clusters
+from .clusters import Clusters, PanelSizes
 from .joints import Joints
 
 if TYPE_CHECKING:
@@ -45,14 +45,21 @@ class Parts:
     radius: np.ndarray  #: (V,) radius of the balls; 0 without members
     length: np.ndarray  #: (E,)
     cut: np.ndarray  #: (E,) length without the balls
-    sides: np.ndarray  #: (P, K) from node k to the next, NaN where a panel has no such side
+    panel_sizes: PanelSizes
     fold: np.ndarray  #: (E,) angle between the panels on their inner side; 180 level, NaN at the boundary [degree]
     node_types: Clusters
+    node_images: np.ndarray  #: (K,) the type of nodes that is the mirror image of each, or NO_IMAGE
     panel_types: Clusters
+    panel_images: np.ndarray  #: (K,) the same of panels
     length_types: Clusters
     node_marks: list[str]
     member_marks: list[str]
     panel_marks: list[str]
+
+    @property
+    def sides(self) -> np.ndarray:
+        """(P, K) from node k to the next, NaN where a panel has no such side."""
+        return self.panel_sizes.sides
 
     @property
     def ball_masses(self) -> np.ndarray | None:

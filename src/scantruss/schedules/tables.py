@@ -10,13 +10,14 @@ import numpy as np
 from ..grid.groups import BOUNDARY, INNER, member_groups
 from ..grid.marks import numbered
 from ..grid.panels import diagonals_of, panel_of_triangles, planarity_of
+from ..layouts.kinds import families_of_grid
 from ..structure.truss import area_vectors
 from .bolts import bolt_mark
 from .clashes import warnings_table
 from .clusters import Clusters, holes_of_types
 from .inner_panels import inner_panels, layer_column, layered_grid
 from .joints import angle_between
-from .mirror_images import NO_IMAGE, node_images, panel_images
+from .mirror_images import NO_IMAGE
 from .places import boundary_nodes, building_places, into_building, rings
 from .records import Column, Schedule, Schedules, Value, column
 
@@ -193,6 +194,7 @@ def _members(parts: Parts, ring: np.ndarray, groups: list[str], mass: np.ndarray
             column("group", "", groups),
             column("ring", "", ring[edges].max(axis=1)),
             column("length type", "", _of(_type_marks("L", parts.length_types), parts.length_types.of)),
+            *_families(parts),
             column("length", "mm", parts.length, summed=True),
             column("start deduction", "mm", parts.radius[edges[:, 0]]),
             column("end deduction", "mm", parts.radius[edges[:, 1]]),
@@ -205,6 +207,15 @@ def _members(parts: Parts, ring: np.ndarray, groups: list[str], mass: np.ndarray
             *_mass(mass),
         ),
     )
+
+
+def _families(parts: Parts) -> list[Column]:
+    """Return the columns of the families of lengths, shortest first, where the members were made to be of few."""
+    if (found := families_of_grid(parts.grid)) is None:
+        return []
+    lengths, of = found
+    marks = numbered("F", len(lengths), 2)
+    return [column("family", "", _of(marks, of)), column("family length", "mm", lengths[of] * parts.size)]
 
 
 def _areas(parts: Parts) -> np.ndarray:
@@ -279,7 +290,7 @@ def _node_types(parts: Parts, mass: np.ndarray | None) -> Schedule:
     return _types(
         "Node types", "NT", types, parts.node_marks, DEGREE,
         column("valence", "", parts.joints.valence[one]), column("ball", "mm", 2.0 * parts.radius[one]), *more,
-        _images("NT", types, node_images(types, parts.joints, parts.settings.angle_tolerance)),
+        _images("NT", types, parts.node_images),
     )  # fmt: skip
 
 
@@ -290,16 +301,8 @@ def _panel_types(parts: Parts) -> Schedule:
         "Panel types", "PT", types, parts.panel_marks, "mm",
         *(column(f"side {k + 1}", "mm", parts.sides[one, k]) for k in range(parts.sides.shape[1])),
         column("area of one", "m2", _areas(parts)[one]),
-        *_panel_images(parts),
+        _images("PT", types, parts.panel_images),
     )  # fmt: skip
-
-
-def _panel_images(parts: Parts) -> list[Column]:
-    """Return the column of the types of triangles that are mirror images; none for other panels, whose sides do not tell."""
-    types = parts.panel_types
-    if parts.grid.panels is not None:
-        return []
-    return [_images("PT", types, panel_images(types, parts.sides, parts.settings.tolerance))]
 
 
 def _lengths(parts: Parts) -> Schedule:

@@ -239,7 +239,9 @@ class ScanSteps(Steps):
             raise InputError("the scan has been cleaned already; take that back with Undo to clean it otherwise")
         removes = self.state.taken()
         removes[removes] = proposal.removes
-        self._take("clean", self.settings, replace(proposal, removes=removes, crop=self.settings.crop), self.state.removed)
+        self._take(
+            "clean", self.settings, replace(proposal, removes=removes, crop=self.settings.crop), self.state.removed
+        )
 
     def remove_points(self, goes: np.ndarray) -> None:
         """Remove some of the points that are taken (M,) bool.

@@ -83,7 +83,9 @@ class StructureTab:
             self.words["size_by"] = gui.add_dropdown(
                 "each section for", WAYS_TO_GROUP, initial_value=kept.size_by, hint="what gets a section of its own"
             )
-            self.numbers["buckling"] = gui.add_text("buckling modes", str(kept.buckling), hint="of the combination that buckles first")
+            self.numbers["buckling"] = gui.add_text(
+                "buckling modes", str(kept.buckling), hint="of the combination that buckles first"
+            )
             self.numbers["frequencies"] = gui.add_text("frequencies", str(kept.frequencies), hint="lowest natural ones")
         run = gui.add_button("Run", color="blue")
         self.results, self.weights = gui.add_markdown(""), gui.add_html("")

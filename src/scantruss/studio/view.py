@@ -40,7 +40,7 @@ NATURAL_VIEW = 0.65  #: of the camera, upright [rad]
 PLAN_VIEW = 0.08  #: the same of a plan, seen from so far that heights hardly matter [rad]
 PLAN_FAR = 1.3  #: of the camera above a plan, so that all of it is seen [distance at which it fills the view]
 PANEL_WIDTH, USUAL_WIDTH = 452, 1280  #: of the panel; of a page that has not said its own [pixel]
-SEEN_FROM = np.array([0.8, -1.4, 0.9])  #: direction from which the scan is seen first
+FIRST_SEEN_FROM = np.array([0.8, -1.4, 0.9])  #: direction from which the scan is seen first
 STEP_NAMES = ("Stop", "Undo", "Redo")
 SMALL_PICTURE, PICTURE_WAIT = (
     (8, 8),
@@ -306,9 +306,9 @@ class StudioView:
     def see(self, places: np.ndarray) -> None:
         """Move the camera so that places of the scene (N, 3) are seen."""
         middle = (places.min(axis=0) + places.max(axis=0)) / 2
-        far = ROOM_AROUND * distance_to_see(places - middle, SEEN_FROM, NATURAL_VIEW, self._aspect)
+        far = ROOM_AROUND * distance_to_see(places - middle, FIRST_SEEN_FROM, NATURAL_VIEW, self._aspect)
         self.client.camera.fov = NATURAL_VIEW
-        self.client.camera.position = tuple(middle + far * SEEN_FROM / np.linalg.norm(SEEN_FROM))
+        self.client.camera.position = tuple(middle + far * FIRST_SEEN_FROM / np.linalg.norm(FIRST_SEEN_FROM))
         self.client.camera.look_at = tuple(middle)
 
     def update(self) -> None:

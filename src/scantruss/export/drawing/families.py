@@ -2,69 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import Any
 
-import numpy as np
-
-from ...grid.grid import Grid
-from ...layouts.families import few_lengths, least_misfit
+from ...grid.alike import JOINTS
+from ...layouts.trade import Traded
 from .structure import drawing_defaults, png_of
 
-COUNTS = (3, 5, 7, 9, 12, 16, 20)  #: lengths that are tried
 LEAST_TICK = 0.04  #: between two numbers below the picture, over its width
 
 
-def encode_families(
-    grid: Grid,
-    tolerance: float,
-    counts: Sequence[int] = COUNTS,
-    off_scan: Callable[[Grid], float] | None = None,
-) -> bytes:
-    """Return the picture of lengths as PNG; misfits over the mean member.
+def encode_lengths(trade: Sequence[Traded], off_before: float | None) -> bytes:
+    """Return the picture of the trade of lengths as PNG; misfits over the mean member.
 
-    off_scan : largest distance of the nodes of a grid from the scan [unit of the grid]; it is drawn below, over the mean member
+    off_before : farthest node of the grid as it was off the scan, over the mean member
     """
-    mean = float(grid.lengths.mean())
-    made = [few_lengths(grid, tolerance, count) for count in counts]
-    return _picture(
-        "lengths",
-        "largest misfit [% of the mean member]",
-        [
-            _Point(
-                count,
-                least_misfit(each.grid.lengths, count) / mean,
-                least_misfit(grid.lengths, count) / mean,
-                float(np.max(each.moved)) / mean,
-                None if off_scan is None else off_scan(each.grid) / mean,
-            )
-            for each, count in zip(made, counts, strict=True)
-        ],
-        None if off_scan is None else off_scan(grid) / mean,
-    )
+    return _picture("lengths", "largest misfit [% of the mean member]", trade, off_before)
 
 
-def encode_kinds(trade: list[dict[str, Any]], parts: str) -> bytes:
-    """Return the picture of joints or panels as PNG, of the stages that `trade_of` tells; parts: what they are called."""
-    points = [
-        _Point(each["kinds"], each["misfit_max"], each["plain_misfit_max"], each["moved_max"], each.get("off_scan_max"))
-        for each in trade
-    ]
-    measure = "of unit directions" if parts == "joints" else "of corners, over the mean member"
-    return _picture(f"kinds of {parts}", f"largest misfit, root mean square\n{measure} [%]", points, points[0].off_scan)
+def encode_kinds(trade: Sequence[Traded], parts: str) -> bytes:
+    """Return the picture of the trade of joints or panels as PNG; parts: what they are called."""
+    measure = "of unit directions" if parts == JOINTS else "of corners, over the mean member"
+    words = f"largest misfit, root mean square\n{measure} [%]"
+    return _picture(f"kinds of {parts}", words, trade, trade[0].off_scan)
 
 
-class _Point(NamedTuple):
-    """A number of lengths or kinds, and what it costs."""
-
-    number: int
-    misfit: float  #: the largest
-    plain: float  #: the same of the grid as it was
-    moved: float  #: farthest move of a node over the mean member
-    off_scan: float | None  #: farthest node off the scan, over the mean member
-
-
-def _picture(counted: str, measure: str, points: list[_Point], off_before: float | None) -> bytes:
+def _picture(counted: str, measure: str, points: Sequence[Traded], off_before: float | None) -> bytes:
     """Return the picture as PNG; all shares in percent."""
     from matplotlib.figure import Figure
 
