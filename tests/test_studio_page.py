@@ -22,7 +22,7 @@ import scantruss as st
 from scantruss.cli.main import main
 from scantruss.studio.browsers import Browsers
 from scantruss.studio.colours import colors_of
-from scantruss.studio.server import DROP_SCRIPT, Guard, serve_browsers, start_server
+from scantruss.studio.server import PAGE_SCRIPT, Guard, serve_browsers, start_server
 from scantruss.studio.session import Session
 
 
@@ -71,7 +71,7 @@ def test_only_our_own_page_is_served(served: tuple[str, Session]) -> None:
     with urllib.request.urlopen(address, timeout=10) as answer:
         assert answer.headers["X-Frame-Options"] == "DENY"  # no other page shows it within itself
         page = answer.read()
-        assert int(answer.headers["Content-Length"]) == len(page) and DROP_SCRIPT.read_bytes() in page
+        assert int(answer.headers["Content-Length"]) == len(page) and PAGE_SCRIPT.read_bytes() in page
 
 
 @pytest.mark.parametrize(

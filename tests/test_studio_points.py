@@ -1,6 +1,7 @@
 """Points in the studio: their own colours and classes, those removed by hand, the tape, and where projects are saved."""
 
 import json
+import re
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -15,7 +16,15 @@ from scantruss.cli.main import main
 from scantruss.scan.formats.own_colors import own_colors
 from scantruss.scan.formats.reading import read_points
 from scantruss.studio.browsers import Browsers
-from scantruss.studio.colours import CLASSES, OWN_COLORS, colorings_of_scan, colors_of, colors_of_scan, rgb_of
+from scantruss.studio.colours import (
+    CLASSES,
+    OWN_COLORS,
+    colorings_of_scan,
+    colors_of,
+    colors_of_scan,
+    histogram_of,
+    rgb_of,
+)
 from scantruss.studio.frame import distance_to_see
 from scantruss.studio.outputs import TAKEN, command_of, settings_files
 from scantruss.studio.pictures import about_z, angle_to_see, facing, over
@@ -239,7 +248,7 @@ def test_a_crop_keeps_the_cleaning_and_the_command_line_does_the_same(
     assert again.state.cleaning is not None and again.state.cleaning.crop == ()
     clean = command_of(session.state).splitlines()[0]
     assert "--crop" not in clean and box not in clean
-    settings = json.loads(settings_files(session.state)["grid.settings.json"])
+    settings = json.loads(settings_files(session.state)["settings.json"])
     monkeypatch.chdir(tmp_path)
     assert main(clean.split()[1:]) == 0
     read = read_points("clean.ply", selection=st.Settings.from_dict(settings).selection)
@@ -319,3 +328,13 @@ def test_a_turntable_shows_all_of_the_scan_and_little_more() -> None:
         most.append((np.abs(seen[:, :2]) / seen[:, 2:] / [half * aspect, half]).max())
     assert max(most) == pytest.approx(1 / 1.1, rel=1e-6)
     assert angle_to_see(points, np.array([[0.5, 0.0, 0.0]]), target, aspect) == np.pi
+
+
+def test_bars_stand_for_the_values_that_they_hold() -> None:
+    values = np.array([1.0, 2.0, 2.0, 2.4, 3.0, np.nan, 9.0])
+    html = histogram_of(values, 1.0, 9.0, False, (2.0, 3.0))
+    bars = re.findall(r'title="(\d+)" data-field="between" data-low="(\S+)" data-high="(\S+)".*?opacity:([\d.]+)', html)
+    held = [(int(count), float(low), float(high)) for count, low, high, _ in bars if int(count)]
+    assert held == [(1, 1.0, 1.0), (2, 2.0, 2.0), (1, 2.4, 2.4), (1, 3.0, 3.0), (1, 9.0, 9.0)]
+    clear = [float(low) for count, low, _, opacity in bars if int(count) and opacity == "1"]
+    assert clear == [2.0, 2.4, 3.0]

@@ -130,7 +130,7 @@ def test_a_project_holds_all_of_it(roof: Session, tmp_path: Path) -> None:
     (tmp_path / "out").mkdir()
     for name, content in settings_files(roof.state).items():
         (tmp_path / "out" / name).write_bytes(content)
-    assert st.Settings.read(tmp_path / "out" / "grid.settings.json") == roof.state.asked
+    assert st.Settings.read(tmp_path / "out" / "settings.json") == roof.state.asked
 
 
 def test_two_browsers_do_not_mix(roof: Session) -> None:

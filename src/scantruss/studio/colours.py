@@ -22,6 +22,8 @@ DIVERGING = np.array([(178, 24, 43), (239, 138, 98), (200, 200, 200), (103, 169,
 PLAIN = np.array([60, 90, 110], np.uint8)
 DIMMED = np.array([215, 218, 220], np.uint8)
 BARS = 24  #: of a histogram
+FAINT_BAR = 0.3  #: opacity of a bar that is not chosen
+BRUSHED = "between"  #: label of the field that a brushed histogram fills
 AROUND_POINT = 10  #: neighbours of which the normal of a point is made
 OUTLIERS_IN_RED = "outliers in red"
 FROM_GRID = "distance from the grid"
@@ -100,16 +102,37 @@ def legend_of_more(most: float, color: str) -> str:
     )
 
 
-def histogram_of(values: np.ndarray, low: float, high: float, diverging: bool) -> str:
-    """Return a histogram of values between the ends of the scale as HTML, its bars in the colours of the scale."""
-    counts, _ = np.histogram(values[np.isfinite(values)], BARS, (low, high if high > low else low + 1.0))
+def histogram_of(
+    values: np.ndarray, low: float, high: float, diverging: bool, chosen: tuple[float, float] | None = None
+) -> str:
+    """Return a histogram of values between the ends of the scale as HTML, its bars in the colours of the scale.
+
+    A click on a bar, or dragging from one to another, gives their values to the field `BRUSHED`.
+
+    Parameters
+    ----------
+    chosen : (float, float), optional
+        Outside of which bars are faint.
+    """
+    known = np.sort(values[np.isfinite(values)])
+    counts, ends = np.histogram(known, BARS, (low, high if high > low else low + 1.0))
+    after = np.cumsum(counts) + np.searchsorted(known, low)
     colors = ramp((np.arange(BARS) + 0.5) / BARS, DIVERGING if diverging else RISING)
+    held = [  # by each bar: its values, or where there are none its ends
+        (known[end - count], known[end - 1]) if count else (begin, stop)
+        for count, end, begin, stop in zip(counts, after, ends[:-1], ends[1:], strict=True)
+    ]
+    first, last = chosen or (-np.inf, np.inf)
+    clear = [1.0 if begin <= last and end >= first else FAINT_BAR for begin, end in held]
     bars = "".join(
-        f'<div title="{count:,}" style="flex:1;height:{max(100 * count / max(counts.max(), 1), 1.0 if count else 0.0):.1f}%;'
-        f'background:rgb({r},{g},{b})"></div>'
-        for count, (r, g, b) in zip(counts.tolist(), colors.tolist(), strict=True)
+        f'<div title="{count:,}" data-field="{BRUSHED}" data-low="{begin:.6g}" data-high="{end:.6g}" tabindex="-1"'
+        f' style="flex:1;height:100%;display:flex;align-items:flex-end;cursor:pointer;opacity:{opacity:g}"><div style="width:100%;'
+        f'height:{max(100 * count / max(counts.max(), 1), 1.0 if count else 0.0):.1f}%;background:rgb({r},{g},{b})"></div></div>'
+        for count, (begin, end), opacity, (r, g, b) in zip(counts.tolist(), held, clear, colors.tolist(), strict=True)
     )
-    return f'<div style="display:flex;align-items:flex-end;height:3.5em;margin:0 .6em;gap:1px">{bars}</div>'
+    return (
+        f'<div style="display:flex;height:3.5em;margin:0 .6em;gap:1px;touch-action:none;user-select:none">{bars}</div>'
+    )
 
 
 def colorings_of_scan(state: StudioState) -> tuple[str, ...]:

@@ -86,7 +86,7 @@ def settings_files(state: StudioState) -> dict[str, bytes]:
     The points are there where some were removed by hand, which no option repeats.
     """
     made = _of_the_file(state)
-    files = {"grid.settings.json": (json.dumps(made.to_dict(), indent=1, ensure_ascii=False) + "\n").encode()}
+    files = {"settings.json": (json.dumps(made.to_dict(), indent=1, ensure_ascii=False) + "\n").encode()}
     if state.solution is not None:
         files["structure.toml"] = settings_text(state.structure_settings).encode()
     if state.removed is not None and state.cloud is not None:
@@ -112,11 +112,15 @@ def command_of(state: StudioState) -> str:
         lines.append(shlex.join(["scantruss", "clean", name, CLEANED, *taken, *state.cleaning.options]))
         name = CLEANED
     lines += [
-        shlex.join(["scantruss", "grid", name, "grid.json", "--settings", "grid.settings.json"]),
-        f"# grid.settings.json: --length {made.length:g} --effort {made.effort} and all else",
+        shlex.join(["scantruss", "grid", name, "grid.json", "--settings", "settings.json"]),
+        f"# settings.json: --length {made.length:g} --effort {made.effort} and all else",
     ]
+    grid = "grid.json"
+    if state.grid is not None and (alike := state.grid.alike) is not None:
+        grid = "few.json"
+        options = ["--parts", alike.parts, "--tolerance", f"{100 * alike.tolerance:g}%", "--count", str(alike.count)]
+        options += ["--mirrored", "same"] if alike.mirrored else []
+        lines.append(shlex.join(["scantruss", "families", "grid.json", grid, *options, "--scan", name]))
     if state.solution is not None:
-        lines.append(
-            shlex.join(["scantruss", "structure", "grid.json", "structure.json", "--settings", "structure.toml"])
-        )
+        lines.append(shlex.join(["scantruss", "structure", grid, "structure.json", "--settings", "structure.toml"]))
     return "\n".join(lines)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 COOKIE = "scantruss_studio"
 BROWSER_KEY = "scantruss_browser"
-DROP_SCRIPT = Path(__file__).with_name("drop.js")
+PAGE_SCRIPT = Path(__file__).with_name("page_script.js")
 STORAGE_PATIENCE = 5.0  #: how long a browser may take to say who it is [s]
 Handler = Callable[[Any, Any], Any]
 
@@ -75,11 +75,11 @@ class Guard:
         return ""
 
     def _add_script(self, answer: Any) -> None:
-        """Give a page the script of dropped files; pages that were served before are remembered."""
+        """Give a page our own script; pages that were served before are remembered."""
         is_packed = answer.headers.get("Content-Encoding") == "gzip"
         if (kept := self._pages.get(is_packed)) is None or kept[0] != answer.body:
             page = gzip.decompress(answer.body) if is_packed else answer.body
-            page = page.replace(b"<head>", b"<head><script>{" + DROP_SCRIPT.read_bytes() + b"}</script>", 1)
+            page = page.replace(b"<head>", b"<head><script>{" + PAGE_SCRIPT.read_bytes() + b"}</script>", 1)
             kept = self._pages[is_packed] = (answer.body, gzip.compress(page) if is_packed else page)
         answer.body = kept[1]
         del answer.headers["Content-Length"]

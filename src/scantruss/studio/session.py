@@ -22,15 +22,15 @@ from ..surface.samples import sample_surface
 from .compare import kept_design
 from .features import Feature, find_features, switched_off
 from .outputs import command_of, files_of, model_to_show
-from .scan_steps import ScanSteps
 from .solving import check_words, solved_state
+from .trade_steps import TradeSteps
 
 SECONDS_OF_FRONT = 0.2  #: between two pictures of a front [s]
 MOST_LIVE_MEMBERS = 60_000  #: of a quick grid that is made while the length changes
 STRUCTURE_WORDS = ("supports", "support_type", "section", "material", "loads", "size_by")  #: what the page asks for
 
 
-class Session(ScanSteps):
+class Session(TradeSteps):
     """The state of a studio, and the steps that change it; see `Steps`."""
 
     def __init__(self, project: Path | None = None, *, folder: Path | None = None) -> None:

@@ -9,6 +9,7 @@ from ..settings.records import EFFORTS, PREFER
 from .feature_list import FeatureList
 from .length_brush import LengthBrush
 from .rows_tool import RowsTool
+from .trade_tool import TradeTool
 
 if TYPE_CHECKING:
     from .state import StudioState
@@ -33,6 +34,8 @@ class DesignTab:
             self.rows = RowsTool(view, gui)
         with gui.add_folder("Length brush", expand_by_default=False):
             self.brush = LengthBrush(view, gui)
+        with gui.add_folder("Few different parts", expand_by_default=False):
+            self.trade = TradeTool(view, gui)
         self.slider.on_update(step(self._slide))
         self.length.on_update(view.typed(self._typed))
         self.effort.on_update(step(lambda: session.set_quietly("effort", effort=self.effort.value)))
@@ -67,7 +70,7 @@ class DesignTab:
             )
         if before is None or before.grid is not state.grid or before.is_live != state.is_live:
             self._fill_grid(state)
-        for part in (self.features, self.rows, self.brush):
+        for part in (self.features, self.rows, self.brush, self.trade):
             part.fill(before, state)
 
     def _fill_grid(self, state: StudioState) -> None:

@@ -8,7 +8,8 @@ import numpy as np
 
 from ..export.page_tables import PageColumn, colorings_of
 from .certificate_list import CertificateList
-from .colours import DIMMED, colors_of, histogram_of, legend_of, legend_of_more, rgb_of, values_of
+from .colours import BRUSHED, DIMMED, colors_of, histogram_of, legend_of, legend_of_more, rgb_of, values_of
+from .drawn_lines import numbers_of
 from .frame import SectionPlane
 from .pictures import PictureTool
 from .scene import (
@@ -43,6 +44,9 @@ class GridTab:
         self.range = gui.add_multi_slider(
             "from, to", 0.0, 1.0, 0.01, (0.0, 1.0), hint="what lies between them stands out"
         )
+        self.between = gui.add_text(
+            BRUSHED, "", hint="two values; a click on a bar, or dragging over several, fills it; empty: all"
+        )
         self.count = gui.add_markdown("")
         self.members, self.panels = gui.add_checkbox("draw members", True), gui.add_checkbox("draw panels", True)
         self.nodes, self.tubes = gui.add_checkbox("draw nodes", False), gui.add_checkbox("as tubes and balls", False)
@@ -52,8 +56,10 @@ class GridTab:
         self.at = gui.add_slider("section at", 0.0, 1.0, 0.01, 0.5)
         self.dark = gui.add_checkbox("dark page", False)
         PictureTool(view, gui)
-        for each in (self.members, self.panels, self.nodes, self.tubes, self.axis, self.at, self.range):
+        for each in (self.members, self.panels, self.nodes, self.tubes, self.axis, self.at):
             each.on_update(step(self.draw))
+        self.range.on_update(step(self._slide))
+        self.between.on_update(view.typed(self._brush))
         self.coloring.on_update(step(lambda: self._chosen(view.session.state)))
         for each in (self.axis, self.at):
             each.on_update(step(lambda: view.scan.draw()))
@@ -84,7 +90,7 @@ class GridTab:
         """Take the colouring that was chosen: its values, legend and histogram."""
         self._values = None
         column = self._column()
-        self.range.visible = self.count.visible = column is not None
+        self.range.visible = self.count.visible = self.between.visible = column is not None
         if column is None:
             self.legend.content = self.bars.content = ""
         else:
@@ -93,9 +99,20 @@ class GridTab:
             self._values = values
             begin, end, step = round_ends(low, high)
             self.range.min, self.range.max, self.range.step = begin, end, step
-            self.range.value = (begin, end)
+            self.range.value, self.between.value = (begin, end), ""
             self.legend.content = legend_of(self.coloring.value, column.unit, low, high, middle is not None)
-            self.bars.content = histogram_of(values, low, high, middle is not None)
+        self.draw()
+
+    def _slide(self) -> None:
+        low, high = self.range.value
+        self.between.value = f"{low:g}, {high:g}"
+        self.draw()
+
+    def _brush(self) -> None:
+        text = self.between.value.strip()
+        low, high = numbers_of(text, 2, f"{BRUSHED} needs two values") if text else (self.range.min, self.range.max)
+        low, high = (min(max(each, self.range.min), self.range.max) for each in sorted((low, high)))
+        self.range.value = (low, high)
         self.draw()
 
     def _column(self) -> PageColumn | None:
@@ -139,6 +156,9 @@ class GridTab:
             self.legend.content = legend
             begin, end = self.range.value
             is_whole = begin <= low and end >= high
+            self.bars.content = histogram_of(
+                self._values, low, high, middle is not None, None if is_whole else (begin, end)
+            )
             selected = None if is_whole else (self._values >= begin) & (self._values <= end)
             colors[choice["kind"]] = drawn_colors(own, selected)
             said = "" if selected is None else f"{int(selected.sum()):,} of "

@@ -1,0 +1,48 @@
+// A file that is dropped anywhere on the page is opened as if it had been chosen with the first upload button.
+const held = (event) => [...(event.dataTransfer?.types ?? [])].includes("Files");
+addEventListener("dragover", (event) => { if (held(event)) event.preventDefault(); });
+addEventListener("drop", (event) => {
+  const input = document.querySelector("input[type=file]");
+  if (!held(event) || !input) return;
+  event.preventDefault();
+  const one = new DataTransfer();
+  one.items.add(event.dataTransfer.files[0]);
+  input.files = one.files;
+  input.dispatchEvent(new Event("change", { bubbles: true }));
+});
+
+// Keys that move a slider, the caret or a list turn the camera too, which listens further out: not while a control has them.
+addEventListener("DOMContentLoaded", () => document.body.addEventListener("keydown", (event) => {
+  const plain = !event.ctrlKey && !event.metaKey && /^(Arrow.*|[a-zA-Z])$/.test(event.key);
+  if (plain && event.target.closest("input, textarea, [role=slider], [role=tab], [role=option]")) event.stopPropagation();
+}));
+
+// A part of a picture that stands for a range of values (data-low to data-high) gives it to the text field that it names (data-field) by a click,
+// by Enter, or with others by dragging from one to the other.
+const give = (name, low, high) => {
+  const label = [...document.querySelectorAll("label")].find((each) => each.textContent.trim() === name);
+  let around = label;
+  while (around && !around.querySelector("input")) around = around.parentElement;
+  const input = around?.querySelector("input");
+  if (!input) return;
+  Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value").set.call(input, low === high ? `${low}` : `${low}, ${high}`);
+  input.dispatchEvent(new Event("input", { bubbles: true }));
+};
+const least = (...parts) => parts.reduce((one, other) => (+other.dataset.low < +one.dataset.low ? other : one)).dataset.low;
+const most = (...parts) => parts.reduce((one, other) => (+other.dataset.high > +one.dataset.high ? other : one)).dataset.high;
+let pressed = null;
+addEventListener("pointerdown", (event) => {
+  pressed = event.target.closest?.("[data-field]");
+  if (pressed) event.preventDefault();
+});
+addEventListener("pointerup", (event) => {
+  const end = event.target.closest?.("[data-field]"), begin = pressed;
+  pressed = null;
+  if (begin && end?.dataset.field === begin.dataset.field) give(begin.dataset.field, least(begin, end), most(begin, end));
+});
+addEventListener("keydown", (event) => {
+  const part = event.target.closest?.("[data-field]");
+  if (!part || !["Enter", " "].includes(event.key)) return;
+  event.preventDefault();
+  give(part.dataset.field, part.dataset.low, part.dataset.high);
+});

@@ -1,0 +1,113 @@
+"""Few different parts in the studio: the trade is that of the library, what is taken that of the command line, and it can be undone."""
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import scantruss as st
+from scantruss.cli.main import main
+from scantruss.layouts.trade import COUNTS
+from scantruss.studio.outputs import command_of, settings_files
+from scantruss.studio.session import Session
+from scantruss.studio.trade_steps import Trade
+from scantruss.studio.trade_tool import curve_of, words_of_present
+
+PATIENCE = 120.0
+
+
+def made(folder: Path) -> Session:
+    """Generate a grid of few members over a shallow dome."""
+    x, y = (each.ravel() for each in np.meshgrid(np.linspace(0, 10, 50), np.linspace(0, 10, 50)))
+    np.savetxt(folder / "dome.xyz", np.stack([x, y, 2 - 0.04 * ((x - 5) ** 2 + (y - 5) ** 2)], axis=1))
+    session = Session(folder / "dome.scantruss")
+    session.open(folder / "dome.xyz")
+    session.set_unit("m")
+    session.change("length", settings=session.settings.replace(length=2.5, effort="quick"))
+    session.generate()
+    done(session)
+    return session
+
+
+def done(session: Session) -> None:
+    """Wait for what runs."""
+    assert session.worker.wait(PATIENCE) and session.message == ""
+
+
+def present(session: Session) -> Trade:
+    """Return the trade, which must be known."""
+    trade = session.present_trade()
+    assert trade is not None
+    return trade
+
+
+@pytest.mark.parametrize(("parts", "tolerance"), [("lengths", 0.03), ("joints", 0.1), ("panels", 0.06)])
+def test_what_is_taken_of_the_trade_is_what_the_command_line_makes(
+    parts: str, tolerance: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    session = made(tmp_path)
+    before = session.grid
+    assert before is not None
+    session.find_trade(parts, tolerance, mirrored=parts == "panels")
+    done(session)
+    trade = present(session)
+    numbers = [each.number for each in trade.traded]
+    assert numbers == sorted(set(numbers), reverse=True)
+    assert numbers == list(COUNTS) if parts == "lengths" else len(numbers) > 1
+    middle = trade.traded[len(numbers) // 2]
+    session.take_traded(middle.number)
+    done(session)
+    taken = session.grid
+    assert taken is not None and taken.certificate is not None and taken.certificate.passed
+    assert taken.alike is not None and taken.alike.count == middle.number and taken.deviation is not None
+    assert f"**{middle.number} " in words_of_present(trade, session.state)
+    assert session.present_trade() is trade  # another number can be taken
+    again = Session()
+    again.open(tmp_path / "dome.scantruss")
+    assert again.grid is not None and again.grid.alike == taken.alike
+    monkeypatch.chdir(tmp_path)
+    for name, content in settings_files(session.state).items():
+        Path(name).write_bytes(content)
+    commands = [line for line in command_of(session.state).splitlines() if not line.startswith("#")]
+    assert len(commands) == 2 and f"--parts {parts}" in commands[1]
+    for line in commands:
+        assert main(line.split()[1:]) == 0
+    few = st.read_grid("few.json")
+    assert np.array_equal(few.nodes, taken.nodes) and few.alike == taken.alike
+    session.undo()
+    assert session.grid is before and session.present_trade() is trade
+
+
+def test_a_trade_needs_a_finished_grid_and_goes_with_it(tmp_path: Path) -> None:
+    with pytest.raises(st.InputError, match="press Generate"):
+        Session().find_trade("lengths", 0.01)
+    session = made(tmp_path)
+    with pytest.raises(st.InputError, match="press Find the trade"):
+        session.take_traded(5)
+    session.find_trade("lengths", 0.2)
+    done(session)
+    trade = present(session)
+    session.take_traded(4)  # of 5 and 3: no more than that
+    done(session)
+    assert session.grid is not None and session.grid.alike is not None and session.grid.alike.count == 3
+    session.trade = None  # as in a project that was opened
+    with pytest.raises(st.InputError, match="lengths of this grid have been made alike"):
+        session.find_trade("joints", 0.01)
+    session.generate()
+    done(session)
+    session.trade = trade
+    assert session.present_trade() is None
+
+
+def test_the_curve_has_a_place_to_click_for_each_number(tmp_path: Path) -> None:
+    session = made(tmp_path)
+    session.find_trade("lengths", 0.2)
+    done(session)
+    trade = present(session)
+    svg = curve_of(trade, 7)
+    assert re.findall(r'data-field="at most" data-low="(\d+)"', svg) == [str(count) for count in sorted(COUNTS)]
+    assert svg.count('stroke-width="2"') == 1  # the present one
+    assert svg.count("<circle") == 3 * len(COUNTS) and "nan" not in svg
+    assert json.loads(json.dumps(words_of_present(trade, session.state))).startswith("the grid as it was")
