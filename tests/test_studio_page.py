@@ -162,7 +162,7 @@ def shown_colors(page: Any) -> np.ndarray:
 
 
 def drag(page: Any, begin: tuple[float, float], end: tuple[float, float]) -> None:
-    """Drag from one place of the drawing to another."""
+    """Drag from one place of the page to another."""
     page.mouse.move(*begin)
     page.mouse.down()
     page.mouse.move(*end, steps=8)
@@ -236,6 +236,22 @@ def test_a_person_makes_a_grid_and_a_structure(served: tuple[str, Session], tmp_
         assert session.settings.length == session.grid.settings.length == length
         page.wait_for_selector("text=certificate: passed")
         assert page.evaluate(FAINT) == []
+        tab(page, "Grid")
+        bars = page.locator("[data-field=between]")
+        ends = [bars.nth(k).bounding_box() for k in (6, 17)]  # brushed from one to the other
+        drag(page, *((box["x"] + 2, box["y"] + 20) for box in ends))
+        assert until(lambda: "," in field(page, "between").input_value())
+        low, high = map(float, field(page, "between").input_value().split(","))
+        inside = ((session.grid.lengths >= low - 1e-5) & (session.grid.lengths <= high + 1e-5)).sum()
+        page.wait_for_selector(f"text={inside} of {len(session.grid.edges)} members")
+        tab(page, "Design")
+        page.click("text=Few different parts")
+        field(page, "tolerance").fill("20%")
+        page.click("button:has-text('Find the trade')")
+        page.click("svg [data-low='5'] rect")
+        page.wait_for_selector("text=undo: 5 lengths")
+        assert session.worker.wait(60) and session.grid.alike is not None and session.grid.alike.count == 5
+        page.click("button:has-text('Undo')")
         tab(page, "Constraints")
         page.click("button:has-text('Place by clicks')")
         page.wait_for_selector("input[value='place fixed node']")
@@ -276,6 +292,10 @@ def test_a_person_makes_a_grid_and_a_structure(served: tuple[str, Session], tmp_
         page.mouse.click(410, 370)
         page.wait_for_selector("text=/(node|member|panel) [NMP]\\d+/")
         tab(page, "Structure")
+        field(page, "section").fill("none such")
+        page.click("button:has-text('Run')")
+        page.wait_for_selector("[role=alert]:has-text('none such')")  # on the drawing too: the panel may have been scrolled
+        field(page, "section").fill("CHS114.3x5")
         page.click("button:has-text('Run')")
         page.wait_for_selector("text=mass without nodes")
         assert session.worker.wait(60) and session.solution is not None

@@ -43,7 +43,7 @@ def present(session: Session) -> Trade:
     return trade
 
 
-@pytest.mark.parametrize(("parts", "tolerance"), [("lengths", 0.03), ("joints", 0.1), ("panels", 0.06)])
+@pytest.mark.parametrize(("parts", "tolerance"), [("lengths", 0.02), ("joints", 0.05), ("panels", 0.06)])
 def test_what_is_taken_of_the_trade_is_what_the_command_line_makes(
     parts: str, tolerance: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -46,6 +46,7 @@ SMALL_PICTURE, PICTURE_WAIT = (
     (8, 8),
     2.0,
 )  #: size of a picture that is asked for first [pixel], and how long it may take [s]
+REFUSAL_SECONDS = 10.0  #: for which a refusal stands on the drawing too [s]
 TYPING_PAUSE = 0.6  #: after which what was typed counts [s]
 
 
@@ -61,6 +62,7 @@ class StudioView:
         self._typed: dict[Callable[[], None], Timer] = {}  # steps of what was typed, which wait for more
         self._typing = RLock()
         self._shown: StudioState | None = None
+        self._refused = session.message
         self._model: tuple[StudioState, Model, Tables] | None = None
         if session.cloud is not None:  # seen while the controls are still being made
             self.scene.scan(session.state, colorings_of_scan(session.state)[0], None, FIRST_POINTS)
@@ -322,6 +324,9 @@ class StudioView:
             undo, redo = session.history.words
             taken = " · ".join(f"{way}: {what}" for way, what in (("undo", undo), ("redo", redo)) if what)
             self.message.content = words + (f"\n\n<small>{taken}</small>" if taken else "")
+            if session.message and session.message != self._refused:  # the panel may have been scrolled
+                self.client.add_notification("Refused", session.message, color="red", auto_close_seconds=REFUSAL_SECONDS)
+            self._refused = session.message
             self.progress.visible, self.progress.value = bool(session.stage), 100.0 * session.share
             self.scene.front(None if state.cloud is None or session.front is None else self.frame, session.front)
             before, self._shown = self._shown, state
