@@ -192,6 +192,19 @@ def test_a_project_that_another_browser_has_open_is_opened_as_a_copy(tmp_path: P
     browsers.stop()
 
 
+def test_a_new_browser_has_the_first_scan_under_its_own_name(tmp_path: Path) -> None:
+    for name in ("a.xyz", "b.xyz"):
+        np.savetxt(tmp_path / name, P)
+    browsers = Browsers(opened(tmp_path / "a.xyz", tmp_path / "a.scantruss"))
+    _, first = browsers.join(None)
+    first.open_path("b.xyz")
+    assert first.worker.wait(120) and first.place == tmp_path / "b.scantruss"
+    _, second = browsers.join(None)
+    assert second.cloud is not None and second.cloud.name == "a.xyz"
+    assert second.place == tmp_path / "a-2.scantruss"
+    browsers.stop()
+
+
 @pytest.mark.parametrize("name", ["../out.xyz", "/etc/passwd", "none.xyz", "inner/../../out.xyz", ""])
 def test_a_path_of_another_folder_is_refused(name: str, tmp_path: Path) -> None:
     home = tmp_path / "home"

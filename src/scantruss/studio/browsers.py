@@ -25,7 +25,7 @@ class Browsers:
     """
 
     def __init__(self, first: Session) -> None:
-        self._first, self._begun, self._lock = first, first.state, RLock()
+        self._first, self._begun, self._place, self._lock = first, first.state, first.place, RLock()
         self._sessions: dict[str, Session] = {}
         self._open: dict[str, int] = {}  # pages that each browser has open
         self._taken = {first.place}
@@ -69,8 +69,8 @@ class Browsers:
             return self._first
         if sum(count > 0 for count in self._open.values()) >= MOST_BROWSERS:
             raise InputError(f"{MOST_BROWSERS} browsers have this studio open, which are the most; close one")
-        place = self._first.place
-        session = Session(None if place is None else self._free(place), folder=self._first.folder)
+        place = None if self._place is None else self._free(self._place)
+        session = Session(place, folder=self._first.folder)
         session.is_taken = self._saved_by_others(session)
         session.begin(self._begun)
         return session
