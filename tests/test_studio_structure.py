@@ -42,8 +42,8 @@ def check_further_files(session: Session, folder: Path) -> None:
 
 
 def test_sizing_and_modes_are_those_of_the_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    x, y = (each.ravel() for each in np.meshgrid(np.linspace(0, 10, 50), np.linspace(0, 10, 50)))
-    np.savetxt(tmp_path / "dome.xyz", np.stack([x, y, 2 - 0.04 * ((x - 5) ** 2 + (y - 5) ** 2)], axis=1))
+    x, y = (each.ravel() for each in np.meshgrid(np.linspace(0, 10, 50), np.linspace(0, 6, 30)))
+    np.savetxt(tmp_path / "dome.xyz", np.stack([x, y, 2 - 0.04 * ((x - 5) ** 2 + (y - 3) ** 2)], axis=1))
     session = Session(tmp_path / "dome.scantruss")
     session.open(tmp_path / "dome.xyz")
     session.set_unit("m")

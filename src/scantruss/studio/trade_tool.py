@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from .view import StudioView
 
 NUMBER_FIELD = "at most"  #: label of the field that a click on the curve fills
-CURVE_WIDTH, CHART_HEIGHT, CHART_GAP, CHART_MARGIN = 400, 76, 30, 40  #: of the charts [pixel]
+CURVE_WIDTH, CHART_HEIGHT, CHART_GAP, CHART_MARGIN = 400, 76, 30, 50  #: of the charts [pixel]
 LEAST_BETWEEN_TICKS = 24  #: numbers of lengths or kinds below the curve [pixel]
 CURVE_COLOR, PLAIN_COLOR, PRESENT_COLOR = "#1c7ed6", "#868e96", "#e8590c"
 
