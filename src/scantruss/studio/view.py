@@ -325,7 +325,9 @@ class StudioView:
             taken = " · ".join(f"{way}: {what}" for way, what in (("undo", undo), ("redo", redo)) if what)
             self.message.content = words + (f"\n\n<small>{taken}</small>" if taken else "")
             if session.message and session.message != self._refused:  # the panel may have been scrolled
-                self.client.add_notification("Refused", session.message, color="red", auto_close_seconds=REFUSAL_SECONDS)
+                self.client.add_notification(
+                    "Refused", session.message, color="red", auto_close_seconds=REFUSAL_SECONDS
+                )
             self._refused = session.message
             self.progress.visible, self.progress.value = bool(session.stage), 100.0 * session.share
             self.scene.front(None if state.cloud is None or session.front is None else self.frame, session.front)
