@@ -38,6 +38,7 @@ FAR_MISSING = 2.0
 MOST_RUNS = 24  # grids that are made at most, before a scan is refused
 MOST_RUNS_OF_CELLS = 3  # the same of quads or hexagons, which are made of triangles that pass
 MOST_FAR, MOST_GIVEN_UP = 2, 3  # attempts in a row of the same settings that are so far from passing, and such settings
+MOST_FAR_OF_BODY = 1  # the same of a body without thin limbs, which is so smooth that other fronts would come no nearer
 
 
 @dataclass(frozen=True)
@@ -104,7 +105,7 @@ def attempts(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:
             yield Attempt(settings.replace(limb_girth=share * settings.limb_girth))
     if rough > VERY_ROUGH_SCAN:
         yield from _smoothed(cloud, settings)
-    for look in looks[:1]:  # opening would cut off sharp edges, which come first
+    for look in looks:
         yield from list(_same_scan(look))[1:]
         settings = look if look.sharp_edges else settings
     if settings.keep_rods and settings.method == "default" and not hall and _has_rods(cloud, settings):
@@ -239,7 +240,7 @@ class AttemptLimit:
         """Whether an attempt is worth making."""
         if self._looks_one_sided and not attempt.settings.smooth_scale:
             return False
-        return self._far_in_a_row(attempt.settings) < MOST_FAR
+        return self._far_in_a_row(attempt.settings) < (MOST_FAR_OF_BODY if attempt.settings.plain_body else MOST_FAR)
 
     def _far_in_a_row(self, settings: Settings) -> int:
         """Return how many attempts of some settings, one after the other, were far from passing."""

@@ -127,8 +127,11 @@ class Advice:
     def _count_at(self, length: float, most: float) -> None:
         """Allow so many grids from now on, or fewer where the scan is large; a shorter length costs more than one that counts once."""
         self._counted_at = length
-        cost = len(self._cloud.points) + POINTS_PER_MEMBER * self.members(length)
-        self._left = min(most, max(LEAST_TRIED, POINTS_LOOKED_AT / cost))
+        self._left = min(most, max(LEAST_TRIED, POINTS_LOOKED_AT / self._cost(length)))
+
+    def _cost(self, length: float) -> float:
+        """Return what a grid of a length costs, as so many points."""
+        return float(len(self._cloud.points) + POINTS_PER_MEMBER * self.members(length))
 
     def try_length(self, length: float, most: int = SOME_MORE) -> LengthTrial | None:
         """Return what comes of a length; None where that was not tried: it is out of range, takes too many members, or enough was tried.
@@ -146,7 +149,7 @@ class Advice:
         low, high = exact_range(self._cloud)
         if not low * (1 - 1e-9) <= length <= high * (1 + 1e-9) or self.members(length) > MOST_MEMBERS:
             return None
-        cost = max(1.0, (self._counted_at / length) ** 2)
+        cost = max(1.0, self._cost(length) / self._cost(self._counted_at))
         allowed = min(most - (known.grids if known is not None else 0), int(self._left / cost))
         if allowed < 1:
             return known
@@ -196,6 +199,8 @@ class Advice:
         both: dict[float, float] = {}  # length -> what is lost there or at the next above
         for share, most in self._ladder():
             length = min(max(_two_digits(share * self._usual), low), high)
+            if most > A_FEW and self._loses_limbs() and any(trial.passed for trial in self.tried):
+                break  # a shorter length than the usual one keeps them, which more grids seldom do
             if any(trial.loses_limbs and trial.length < length for trial in self.tried):
                 continue
             trial = self.try_length(length, most)
@@ -221,8 +226,18 @@ class Advice:
     def _ladder(self) -> Iterator[tuple[float, int]]:
         """Yield the lengths to try in turn, as multiples of the usual one, with how many grids are made of each."""
         yield 1.0, A_FEW
-        usual = self._found.get(min(self._found, key=self._far_from_usual)) if self._found else None
-        yield from SHORTER_FIRST if usual is not None and (usual.passed or usual.leaves_out) else LONGER_FIRST
+        usual = self._tried_usual()
+        ladder = SHORTER_FIRST if usual is not None and (usual.passed or usual.leaves_out) else LONGER_FIRST
+        yield from sorted(ladder, key=lambda step: step[1]) if self._loses_limbs() else ladder
+
+    def _tried_usual(self) -> LengthTrial | None:
+        """Return what came of the usual length, or of that tried which is nearest to it."""
+        return self._found.get(min(self._found, key=self._far_from_usual)) if self._found else None
+
+    def _loses_limbs(self) -> bool:
+        """Whether limbs are too thin for the usual length."""
+        usual = self._tried_usual()
+        return usual is not None and usual.loses_limbs
 
     def _far_from_usual(self, length: float) -> float:
         """Return how far a length is from the usual one."""
