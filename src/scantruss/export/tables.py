@@ -57,7 +57,7 @@ def _model_sheet(model: Model) -> list[SheetRow]:
         *((f"origin {axis}", value) for axis, value in zip("xyz", model.origin.tolist(), strict=True)),
         ("nodes", len(model.local)),
         ("members", len(model.members)),
-        ("panels", len(model.triangles)),
+        ("panels", len(model.panels)),
     ]
     if model.truss is not None:
         rows += [("joints", "pinned" if model.truss.pinned else "rigid or springs"), ("scale", model.truss.scale)]
@@ -94,8 +94,8 @@ def _geometry(model: Model) -> dict[str, list[SheetRow]]:
         "Nodes": [("node", *(f"{axis}{unit}" for axis in "xyz"), "sets"), *places],
         "Members": [tuple(columns), *zip(*columns.values(), strict=True)],
         "Panels": [
-            ("panel", "node 1", "node 2", "node 3"),
-            *((mark, *(marks[k] for k in nodes)) for mark, nodes in zip(model.panel_marks, model.triangles.tolist(), strict=True)),
+            ("panel", *(f"node {k + 1}" for k in range(model.panels.shape[1]))),
+            *((mark, *(marks[k] for k in loop)) for mark, loop in zip(model.panel_marks, model.panel_loops, strict=True)),
         ],
     }  # fmt: skip
 
