@@ -94,7 +94,8 @@ def convert(values: Namespace) -> None:
         if model.truss is not None and any(out.suffix.lower() == ".json" for out in outs):
             bars.note("the checks of the members are not written again; scantruss structure writes them")
         written = write_models(model, outs, save, bars, style)
-    size = f"{len(model.local):,} nodes, {len(model.members):,} members, {len(model.triangles):,} triangles"
+    panels = "panels" if model.grid is None else model.grid.panels_are
+    size = f"{len(model.local):,} nodes, {len(model.members):,} members, {len(model.panels):,} {panels}"
     print_lines([size, f"wrote {' '.join(map(str, written))}"])
 
 
