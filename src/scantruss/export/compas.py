@@ -121,6 +121,4 @@ def _mesh(data: dict[str, Any]) -> tuple[list[tuple[float, ...]], list[list[int]
 
 def _graph(data: dict[str, Any]) -> tuple[list[tuple[float, ...]], list[tuple[int, int]]]:
     number = {key: k for k, key in enumerate(data["node"])}
-    return _places(data["node"]), [
-        (number[start], number[end]) for start, ends in data["edge"].items() for end in ends
-    ]
+    return _places(data["node"]), [(number[start], number[end]) for start, ends in data["edge"].items() for end in ends]

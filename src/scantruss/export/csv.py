@@ -59,7 +59,9 @@ def _members(grid: Grid, model: Model) -> Table:
     places = np.concatenate([nodes[start], nodes[end], grid.lengths[:, None]], axis=1)
     boundary = (grid.edge_uses == 1).astype(int)
     number = {pair: k for k, pair in enumerate(map(tuple, np.sort(model.members, axis=1).tolist()))}
-    own = [number[pair] for pair in map(tuple, np.sort(grid.edges, axis=1).tolist())]  # members of layers are in another order there
+    own = [
+        number[pair] for pair in map(tuple, np.sort(grid.edges, axis=1).tolist())
+    ]  # members of layers are in another order there
     marks, groups = model.member_marks, [model.groups[k] for k in model.group_of.tolist()]
     rows = zip(
         range(len(start)), start.tolist(), end.tolist(), *places.T.tolist(), boundary.tolist(), [marks[k] for k in own],
@@ -69,12 +71,13 @@ def _members(grid: Grid, model: Model) -> Table:
 
 
 def _nodes(grid: Grid, model: Model) -> Table:
-    """Return the table of nodes: place, members there, whether on a boundary, fixed, distance from the scan, lines and ridges, mark."""
+    """Return the table of nodes: place, members there, whether on a boundary, fixed, mark, distance from the scan, lines and ridges."""
     valence = np.bincount(grid.edges.ravel(), minlength=len(grid.nodes))
     boundary = np.zeros(len(grid.nodes), int)
     boundary[grid.edges[grid.edge_uses == 1].ravel()] = 1
-    header = ["id", *_with_unit("x y z", grid.unit), "valence", "boundary", "fixed"]
-    columns = [*grid.scan_nodes.T.tolist(), valence.tolist(), boundary.tolist(), np.asarray(grid.fixed, int).tolist()]
+    header = ["id", *_with_unit("x y z", grid.unit), "valence", "boundary", "fixed", "mark"]
+    fixed = np.asarray(grid.fixed, int).tolist()
+    columns = [*grid.scan_nodes.T.tolist(), valence.tolist(), boundary.tolist(), fixed, list(model.node_marks)]
     if grid.deviation is not None:
         header += _with_unit("deviation", grid.unit)
         columns.append([None if value != value else value for value in np.asarray(grid.deviation, float).tolist()])
@@ -84,8 +87,6 @@ def _nodes(grid: Grid, model: Model) -> Table:
     if grid.line_sets:
         header.append("lines")
         columns.append(_names_of_lines(grid))
-    header.append("mark")
-    columns.append(list(model.node_marks))
     return (header, zip(range(len(grid.nodes)), *columns, strict=True))
 
 

@@ -20,24 +20,32 @@ if TYPE_CHECKING:
     from ezdxf.entities import DXFEntity
 
 OURS = ("NODE", "SUPPORT")  #: blocks of our DXF files that are no members
-UNDRAWN = ("TEXT", "MTEXT", "POINT", "DIMENSION", "VIEWPORT", "ATTDEF", "ATTRIB")  #: entities of DXF without a line or face
+UNDRAWN = (
+    "TEXT",
+    "MTEXT",
+    "POINT",
+    "DIMENSION",
+    "VIEWPORT",
+    "ATTDEF",
+    "ATTRIB",
+)  #: entities of DXF without a line or face
 MOST_NESTED = 16  #: depth of blocks in blocks that is read
 
-Place = tuple[float, ...]
+DrawnPlace = tuple[float, ...]
 
 
-class Strokes:
+class DrawnParts:
     """Collects lines and faces by their corners."""
 
     def __init__(self) -> None:
-        self.points: list[Place] = []
+        self.points: list[DrawnPlace] = []
         self.lines: list[tuple[int, int]] = []
         self.faces: list[list[int]] = []
         self.loops: list[list[int]] = []
-        self.nodes: list[Place] = []
+        self.nodes: list[DrawnPlace] = []
         self.others: dict[str, int] = {}  #: what is not read, and how often
 
-    def path(self, places: list[Place]) -> None:
+    def path(self, places: list[DrawnPlace]) -> None:
         """Add the lines from place to place, and a loop where they end where they began."""
         start = len(self.points)
         self.points += places
@@ -45,7 +53,7 @@ class Strokes:
         if len(places) > 3 and places[0] == places[-1]:
             self.loops.append(list(range(start, start + len(places) - 1)))
 
-    def face(self, places: list[Place]) -> None:
+    def face(self, places: list[DrawnPlace]) -> None:
         """Add a face; a corner that is there twice in turn counts once."""
         corners = [place for k, place in enumerate(places) if place != places[k - 1]]
         if len(corners) < 3:
@@ -74,7 +82,7 @@ class Strokes:
 def draw_obj(path: Path) -> Drawing:
     """Return the lines `l` and faces `f` of an OBJ file."""
     read_head(path)
-    points: list[Place] = []
+    points: list[DrawnPlace] = []
     lines: list[tuple[int, int]] = []
     faces: list[list[int]] = []
     unit = before = ""
@@ -129,7 +137,7 @@ def draw_dxf(path: Path) -> Drawing:
     import ezdxf
 
     read_head(path)
-    found = Strokes()
+    found = DrawnParts()
     with reading_as(path, "a DXF file"):
         drawing = ezdxf.readfile(path)
         for entity in drawing.modelspace():
@@ -138,7 +146,7 @@ def draw_dxf(path: Path) -> Drawing:
     return found.drawing(next((unit for unit, number in INSUNITS.items() if number == code), ""))
 
 
-def _dxf_entity(entity: DXFEntity, found: Strokes, depth: int = 0) -> None:
+def _dxf_entity(entity: DXFEntity, found: DrawnParts, depth: int = 0) -> None:
     kind: Any = entity.dxftype()
     made: Any = entity
     if kind == "LINE":
@@ -177,11 +185,9 @@ def draw_3dm(path: Path) -> Drawing:
     file = rhino3dm.File3dm.Read(str(path))
     if file is None:
         raise FormatError(f"{path} cannot be read as a Rhino file; save it again")
-    found = Strokes()
+    found = DrawnParts()
     shapes = {str(each.Attributes.Id): each.Geometry for each in file.Objects}
-    parts = {
-        str(block.Id): [str(part) for part in block.GetObjectIds()] for block in file.InstanceDefinitions
-    }
+    parts = {str(block.Id): [str(part) for part in block.GetObjectIds()] for block in file.InstanceDefinitions}
     within = {part for ids in parts.values() for part in ids}
     for each in file.Objects:
         if str(each.Attributes.Id) not in within:
@@ -192,7 +198,9 @@ def draw_3dm(path: Path) -> Drawing:
     )
 
 
-def _rhino_shape(shape: Any, found: Strokes, shapes: dict[str, Any], parts: dict[str, list[str]], depth: int = 0) -> None:
+def _rhino_shape(
+    shape: Any, found: DrawnParts, shapes: dict[str, Any], parts: dict[str, list[str]], depth: int = 0
+) -> None:
     import rhino3dm
 
     if isinstance(shape, rhino3dm.InstanceReference) and depth < MOST_NESTED:
@@ -214,5 +222,5 @@ def _rhino_shape(shape: Any, found: Strokes, shapes: dict[str, Any], parts: dict
         found.other("curves" if isinstance(shape, rhino3dm.Curve) else "surfaces and others")
 
 
-def _xyz(point: Any) -> Place:
+def _xyz(point: Any) -> DrawnPlace:
     return point.X, point.Y, point.Z

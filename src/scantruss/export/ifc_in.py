@@ -12,12 +12,14 @@ from typing import Any
 import numpy as np
 
 from ..scan.formats.kinds import read_head, reading_as
-from .drawing_files import Place, Strokes
+from .drawing_files import DrawnParts, DrawnPlace
 from .drawing_in import Drawing
 
 PHYSICAL, ANALYTIC = ("IfcMember", "IfcBeam", "IfcColumn"), ("IfcStructuralCurveMember",)
 AXES, BODIES = ("Axis", "Reference", None), ("Body",)  #: identifiers of representations
-OUR_PANEL = "panel"  #: type of the plates that we write, whose faces say which members enclose a panel of more than four nodes
+OUR_PANEL = (
+    "panel"  #: type of the plates that we write, whose faces say which members enclose a panel of more than four nodes
+)
 STRAIGHT = 1e-6  #: distance of a point of an axis from the line between its ends, over their distance, up to which it is straight
 
 Ends = tuple[np.ndarray, np.ndarray]
@@ -29,13 +31,13 @@ def draw_ifc(path: Path) -> Drawing:
     from ifcopenshell.util.unit import calculate_unit_scale
 
     read_head(path)
-    found, by_body = Strokes(), 0
+    found, by_body = DrawnParts(), 0
     with reading_as(path, "an IFC file"):
         file = ifcopenshell.open(str(path))
         scale = float(calculate_unit_scale(file))
         to_map, system = _map_of(file)
 
-        def on_map(place: np.ndarray) -> Place:
+        def on_map(place: np.ndarray) -> DrawnPlace:
             return tuple((to_map[:3, :3] @ (scale * place) + to_map[:3, 3]).tolist())
 
         for kinds in (PHYSICAL, ANALYTIC):
@@ -56,7 +58,9 @@ def draw_ifc(path: Path) -> Drawing:
                 for face in _faces_of(plate):
                     found.face([on_map(corner) for corner in face])
     drawing = replace(found.drawing("m"), system=system)
-    words = f"; {by_body:,} members have no axis but that of their body, which ends where they are cut" if by_body else ""
+    words = (
+        f"; {by_body:,} members have no axis but that of their body, which ends where they are cut" if by_body else ""
+    )
     return replace(drawing, left=words + drawing.left)
 
 
@@ -100,7 +104,9 @@ def _axis(part: Any, identifiers: tuple[str | None, ...]) -> Ends | None:
     """Return the ends of the axis of a member in the unit of the file, of the first representation that has a straight one."""
     place = _place(part)
     for shape in part.Representation.Representations if part.Representation else ():
-        if shape.RepresentationIdentifier in identifiers or (identifiers is AXES and shape.RepresentationType == "Edge"):
+        if shape.RepresentationIdentifier in identifiers or (
+            identifiers is AXES and shape.RepresentationType == "Edge"
+        ):
             lines = [line for item in shape.Items for line in _lines_of(item, place)]
             if (ends := _straight(lines)) is not None:
                 return ends
@@ -176,7 +182,9 @@ def _middle_of(profile: Any) -> tuple[float, float]:
     """Return the middle of a profile in its plane: its placement, or the middle of its outline."""
     if profile.is_a("IfcParameterizedProfileDef"):
         return (0.0, 0.0) if profile.Position is None else tuple(profile.Position.Location.Coordinates[:2])
-    corners = np.array(_corners_of(profile.OuterCurve)) if profile.is_a("IfcArbitraryClosedProfileDef") else np.zeros((0, 2))
+    corners = (
+        np.array(_corners_of(profile.OuterCurve)) if profile.is_a("IfcArbitraryClosedProfileDef") else np.zeros((0, 2))
+    )
     return tuple(((corners.min(axis=0) + corners.max(axis=0)) / 2)[:2].tolist()) if len(corners) else (0.0, 0.0)
 
 
