@@ -334,7 +334,8 @@ def test_a_bent_axis_of_ifc_is_counted_not_read(tmp_path: Path) -> None:
 
 def test_meshes_and_graphs_of_compas_as_it_writes_them(tmp_path: Path) -> None:
     compas = pytest.importorskip("compas")
-    from compas.datastructures import Graph, Mesh
+    parts: Any = pytest.importorskip("compas.datastructures")
+    Mesh, Graph = parts.Mesh, parts.Graph  # noqa: N806
 
     class Shell(Mesh):  # type: ignore[misc]
         """What derives from a mesh, as those of other packages do."""
