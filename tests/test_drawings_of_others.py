@@ -335,20 +335,16 @@ def test_a_bent_axis_of_ifc_is_counted_not_read(tmp_path: Path) -> None:
 def test_meshes_and_graphs_of_compas_as_it_writes_them(tmp_path: Path) -> None:
     compas = pytest.importorskip("compas")
     parts: Any = pytest.importorskip("compas.datastructures")
-    Mesh, Graph = parts.Mesh, parts.Graph  # noqa: N806
-
-    class Shell(Mesh):  # type: ignore[misc]
-        """What derives from a mesh, as those of other packages do."""
-
+    derived = type("Shell", (parts.Mesh,), {})  # as other packages do
     nodes, quads = vault()
     path = tmp_path / "a.compas.json"
-    compas.json_dump(Mesh.from_vertices_and_faces(nodes.tolist(), quads), path)
+    compas.json_dump(parts.Mesh.from_vertices_and_faces(nodes.tolist(), quads), path)
     hold(path, nodes, quads)
-    compas.json_dump({"steps": [1, {"shell": Shell.from_vertices_and_faces(nodes.tolist(), quads)}]}, path)
+    compas.json_dump({"steps": [1, {"shell": derived.from_vertices_and_faces(nodes.tolist(), quads)}]}, path)
     hold(path, nodes, quads)
-    compas.json_dump([Graph.from_nodes_and_edges(nodes.tolist(), lines_of(quads))], path)
+    compas.json_dump([parts.Graph.from_nodes_and_edges(nodes.tolist(), lines_of(quads))], path)
     hold(path, nodes, quads)
-    both = [Mesh.from_vertices_and_faces(nodes.tolist(), quads), Mesh.from_vertices_and_faces(nodes.tolist(), quads)]
+    both = [parts.Mesh.from_vertices_and_faces(nodes.tolist(), quads) for _ in range(2)]
     compas.json_dump(both, path)
     assert "not read: 1 more Mesh or Graph" in read_model(path).notes[0]
 

@@ -76,6 +76,7 @@ FORMATS: dict[str, FileFormat] = {
     ".csv": FileFormat(
         "CSV",
         lambda model, path, style: encode_csv(model, path, style),
+        loses="panels",
         loses_of_structure=NO_STRUCTURE,
     ),
     ".json": FileFormat("JSON", lambda model, path, style: {path: function("json.encode_model")(model)},
