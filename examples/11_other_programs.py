@@ -1,4 +1,4 @@
-"""From a scan to other programs: the roof of a great court as IFC, SAF and DXF, with sections, supports, loads and results where they can hold them."""
+"""From a scan to other programs: a great court as IFC, SAF and DXF, with sections, supports, loads and results where these hold them."""
 
 from pathlib import Path
 

@@ -335,7 +335,7 @@ def test_a_bent_axis_of_ifc_is_counted_not_read(tmp_path: Path) -> None:
 def test_meshes_and_graphs_of_compas_as_it_writes_them(tmp_path: Path) -> None:
     compas = pytest.importorskip("compas")
     parts: Any = pytest.importorskip("compas.datastructures")
-    derived = type("Shell", (parts.Mesh,), {})  # as other packages do
+    derived: Any = type("Shell", (parts.Mesh,), {})  # as other packages do
     nodes, quads = vault()
     path = tmp_path / "a.compas.json"
     compas.json_dump(parts.Mesh.from_vertices_and_faces(nodes.tolist(), quads), path)

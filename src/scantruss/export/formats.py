@@ -267,14 +267,14 @@ def read_model(path: str | Path, merge: float | None = None) -> Model:
     ----------
     path : str or Path
         A .json that `scantruss grid` or `scantruss structure` wrote, of which a structure with load cases is solved again; or lines
-        and faces that others drew: .obj, .ply, .dxf, .3dm, .ifc. The notes of the model say what is to be known of these.
+        and faces that others drew: .obj, .ply, .dxf, .3dm, .ifc, .compas.json. The notes of the model say what is to be known of these.
     merge : float, optional
         Distance within which ends of such lines are one node; by default a thousandth of their median length.
 
     Raises
     ------
     FormatError
-        Unknown suffix, an extra that is not installed, or the file cannot be read or is no grid of triangles.
+        Unknown suffix, an extra that is not installed, or the file cannot be read or is no grid.
     """
     path = Path(path)
     known = {suffix: row for suffix, row in FORMATS.items() if row.read or row.draw}

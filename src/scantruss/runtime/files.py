@@ -22,7 +22,6 @@ from ..errors import FormatError
 from .ours import MARK, check_ours
 from .stopping import is_clean, left_behind, put_into_place, signals_held
 
-
 #: suffix of another program -> suffix of the format that it reads
 RELATED = {
     ".dwg": ".dxf", ".dgn": ".dxf", ".rvt": ".ifc", ".igs": ".step", ".iges": ".step", ".sat": ".step", ".gltf": ".glb",
@@ -45,7 +44,7 @@ def nearest_suffix(path: Path, suffixes: Collection[str]) -> str:
     double = [suffix for suffix in suffixes if suffix.count(".") > 1]  # such as .saf.xlsx
     near = (
         get_close_matches(both, double, 1, 0.8)
-        or [suffix for suffix in (RELATED.get(own),) if suffix in suffixes]
+        or [suffix for suffix in suffixes if suffix == RELATED.get(own)]
         or get_close_matches(own, suffixes, 1, 0.6)
     )
     return f"; the nearest is {near[0]}" if near else ""
