@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import ezdxf
 import meshio
 import numpy as np
 import pytest
@@ -226,3 +227,25 @@ def test_points_of_a_drawing_have_its_unit(code: int, unit: str, tmp_path: Path)
     cloud = st.read_points(tmp_path / "a.dxf")
     np.testing.assert_array_equal(cloud.points + cloud.origin, plate())
     assert cloud.unit == thin_scan(tmp_path / "a.dxf", 1e-3).unit == unit
+
+
+def test_points_within_blocks_of_a_drawing_are_read(tmp_path: Path) -> None:
+    """A survey places a block for each point, a station another with several."""
+    drawing = ezdxf.new()
+    drawing.header["$INSUNITS"] = 6
+    mark, station, empty = (drawing.blocks.new(name) for name in ("MARK", "STATION", "NORTH"))
+    mark.add_point((0, 0, 0))
+    mark.add_circle((0, 0), 0.1)
+    station.add_blockref("MARK", (1, 0, 0))
+    station.add_blockref("MARK", (0, 2, 0))
+    empty.add_line((0, 0), (0, 1))
+    space = drawing.modelspace()
+    for place in plate(50).tolist():
+        space.add_blockref("MARK", place, {"rotation": 30})
+    space.add_blockref("STATION", (10, 20, 5), {"rotation": 90})
+    space.add_blockref("NORTH", (0, 0, 0))
+    drawing.saveas(tmp_path / "a.dxf")
+    cloud = st.read_points(tmp_path / "a.dxf")
+    there = [*plate(50).tolist(), (10, 21, 5), (8, 20, 5)]
+    np.testing.assert_allclose(cloud.points + cloud.origin, there, atol=1e-9)
+    assert "1 other entities of a.dxf are not read" in cloud.notes
