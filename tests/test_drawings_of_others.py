@@ -354,7 +354,9 @@ def test_faces_without_lines_between_them_are_one_panel() -> None:
     halves = np.array([half for a, b, c, d in quads for half in ((a, b, c), (c, d, a))])
     lines = np.array(lines_of(quads))
     grid, (note,) = grid_of_drawing(Drawing(nodes, lines, halves), "a.obj")
-    assert places_of(grid) == places_of(grid_of(nodes, quads)) and f"{len(quads)} fewer" in note
+    assert (
+        places_of(grid) == places_of(grid_of(nodes, quads)) and f"{len(quads)} sides of its faces are no lines" in note
+    )
     grid, (note,) = grid_of_drawing(Drawing(nodes, lines[:5], halves), "a.obj")  # some lines, as of a ridge
     assert len(grid.panel_table) == len(halves) and "no lines, and members all the same" in note
     around = lines[[{a, b} <= {0, 1, 2, 6, 8, 12, 13, 14} for a, b in lines.tolist()]]  # node 7 would lie within

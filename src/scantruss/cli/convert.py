@@ -110,15 +110,21 @@ def claim_models(outs: list[Path], taken: Taken, *, force: bool, what: str = "re
 
 
 def write_models(
-    model: Model, outs: list[Path], save: SaveTogether, bars: Bars, style: FileStyle | None = None
+    model: Model,
+    outs: list[Path],
+    save: SaveTogether,
+    bars: Bars,
+    style: FileStyle | None = None,
+    *,
+    say_losses: bool = True,
 ) -> list[Path]:
-    """Write a model in several formats, say once what each does not hold, and return the places of all files."""
+    """Write a model in several formats, say once what each does not hold if that is wanted, and return the places of all files."""
     from ..export.formats import losses, write
 
     written: list[Path] = []
     for number, out in enumerate(outs):
         bars("write", number / len(outs))
         written += [out.with_name(file.name) for file in write(model, save.beside(out), style=style)]
-        for note in losses(model, out):
+        for note in losses(model, out) if say_losses else ():
             bars.note_once(note)
     return written

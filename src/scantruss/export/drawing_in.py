@@ -103,7 +103,10 @@ def _panels(
         missing = len(sides_on_no_line(panels, lines)) if len(lines) else 0
         how = f"; {missing:,} sides of its faces are no lines, and members all the same" if missing else ""
         joined = len(faces) - len(panels)
-        return panels, f"; its faces without lines between them are one panel, {joined:,} fewer" if joined else how
+        return (
+            panels,
+            f"; {joined:,} sides of its faces are no lines: faces beside them are one panel" if joined else how,
+        )
     loops = np.where(drawing.loops < 0, -1, number[drawing.loops])
     if len(loops) and not len(lines_on_no_panel(lines, loops)):
         return loops, f"; its panels are all {len(loops):,} closed polylines"
