@@ -1,4 +1,4 @@
-"""From a scan to other programs: a roof as IFC, SAF and DXF, with sections, supports, loads and results where they can hold them."""
+"""From a scan to other programs: a great court as IFC, SAF and DXF, with sections, supports, loads and results where these hold them."""
 
 from pathlib import Path
 
@@ -8,11 +8,11 @@ import scantruss as st
 
 
 def main(folder: Path = Path()) -> st.Truss:
-    """Make a grid, a structure 300 times its size, solve it, and write it for BIM, analysis and CAD."""
-    grid = st.grid_from_points(make("stadium", 30_000).points, st.Settings(length=6.0, unit="mm"))
-    truss = st.Truss.from_grid(grid, scale=300, section="CHS114.3x5", supports="boundary", loads="self,snow:1kN/m2")
+    """Make a grid and a structure of it, solve it, and write it for BIM, analysis, CAD and a browser."""
+    grid = st.grid_from_points(make("court", 30_000).points, st.Settings(length=5.5, unit="m"))
+    truss = st.Truss.from_grid(grid, section="CHS168.3x8", supports="loop:1+loop:2", loads="self,snow:0.6kN/m2")
     solution = st.solve(truss)
-    for name in ("stadium.ifc", "stadium.saf.xlsx", "stadium.dxf", "stadium.glb"):
+    for name in ("court.ifc", "court.saf.xlsx", "court.dxf", "court.glb"):
         st.write(solution, folder / name)
     print(truss)
     return truss

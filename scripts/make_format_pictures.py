@@ -76,7 +76,7 @@ def draw_ifc_bodies(path: Path, picture: Path) -> None:
     axes.add_collection3d(Poly3DCollection(whole, facecolors=np.repeat(shade[:, None], 3, axis=1) * [0.75, 0.85, 1.0]))
     low, high = whole.reshape(-1, 3).min(axis=0), whole.reshape(-1, 3).max(axis=0)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
-    axes.set_box_aspect(high - low, zoom=1.1)
+    axes.set_box_aspect(high - low, zoom=1.02)
     axes.view_init(35, -60)
     axes.set_axis_off()
     figure.subplots_adjust(0, 0, 1, 1)

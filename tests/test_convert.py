@@ -81,6 +81,9 @@ def test_the_utilization_of_a_structure_goes_along(place: Path, capsys: pytest.C
     [
         ("convert net.json a.jsn", "the nearest is .json"),
         ("convert net.json a.iffc", "the nearest is .ifc"),
+        ("convert roof.json a.saf.xls", "the nearest is .saf.xlsx"),
+        ("convert net.json a.dwg", "the nearest is .dxf"),
+        ("convert plan.dwg a.obj", "the nearest is .dxf"),
         ("convert net.json a.saf.xlsx", "SAF holds structures"),
         ("convert roof.json a.png", "no format"),
         ("convert none.json a.ply", "there is no file none.json"),

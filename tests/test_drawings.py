@@ -141,7 +141,7 @@ MOEBIUS = [(0, 1, 2), (1, 3, 2), (2, 3, 4), (3, 0, 4), (4, 0, 1)]
     [
         ("v 0 0 0\n", "no lines and no faces"),
         ("v 0 0 0\nv 1 0 0\nl 1 2\n", "1 of 1 lines on no panel"),
-        ("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n", "with 4 corners"),
+        ("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 2\n", "meets itself"),
         ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 7\n", "names points that it does not have"),
         ("v 0 0 0\nv 1 0\nf 1 2 3\n", "line 2 is damaged"),
         ("v 0 0 0\nv 1 0 0\nv 0 nan 0\nf 1 2 3\n", "no number"),

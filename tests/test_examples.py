@@ -148,10 +148,10 @@ def test_other_programs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None
 
     truss = run("11_other_programs", tmp_path, monkeypatch)
     count = len(truss.members)
-    assert len(ifcopenshell.open(str(tmp_path / "stadium.ifc")).by_type("IfcStructuralCurveMember")) == count
-    assert openpyxl.load_workbook(tmp_path / "stadium.saf.xlsx")["StructuralCurveMember"].max_row == count + 1
-    assert len(ezdxf.readfile(tmp_path / "stadium.dxf").modelspace().query("LINE")) == count
-    assert "members" in trimesh.load(tmp_path / "stadium.glb").geometry
+    assert len(ifcopenshell.open(str(tmp_path / "court.ifc")).by_type("IfcStructuralCurveMember")) == count
+    assert openpyxl.load_workbook(tmp_path / "court.saf.xlsx")["StructuralCurveMember"].max_row == count + 1
+    assert len(ezdxf.readfile(tmp_path / "court.dxf").modelspace().query("LINE")) == count
+    assert "members" in trimesh.load(tmp_path / "court.glb").geometry
 
 
 def test_free_grid(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

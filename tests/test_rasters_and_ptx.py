@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import ezdxf
+import meshio
 import numpy as np
 import pytest
 import rasterio
@@ -21,6 +23,8 @@ from scantruss.scan.formats.reading import read_content
 from scantruss.scan.formats.vtk_xml import read_vtk_xml
 from scantruss.scan.stream.thin_scan import thin_scan
 
+#: written by vtk 9.7.2, which is too large a package for tests: (60 or 1600) points 40 a row, height x y / 4, one normal
+VTK_FILES = Path(__file__).parent / "vtk_files"
 HEIGHTS = np.array([[1.5, 2, 3, 4], [5, -9999, 7, 8], [9, 10, 11, 12.25]])
 
 
@@ -199,31 +203,22 @@ def test_objects_of_a_3mf_file_are_placed_in_its_unit(tmp_path: Path) -> None:
     np.testing.assert_allclose([content.points.min(axis=0), content.points.max(axis=0)], scene.bounds, atol=1e-6)
 
 
-@pytest.mark.parametrize("form", ["ascii", "binary", "raw", "zlib"])
-def test_vtp_and_vtu_files_of_vtk_itself_are_read(form: str, tmp_path: Path) -> None:
-    vtk = pytest.importorskip("vtk", exc_type=ImportError)
-    from vtk.util.numpy_support import numpy_to_vtk
+@pytest.mark.parametrize("form", ["ascii", "base64", "appended", "raw", "zlib", "lzma"])
+@pytest.mark.parametrize("suffix", [".vtp", ".vtu"])
+def test_files_that_vtk_wrote_are_read(suffix: str, form: str) -> None:
+    content = read_vtk_xml(VTK_FILES / f"{form}{suffix}")
+    x, y = np.divmod(np.arange(1600 if form in ("zlib", "lzma") else 60), 40)[::-1]
+    np.testing.assert_array_equal(content.points, np.stack([x, y, 0.25 * x * y], axis=1))
+    assert content.normals is not None and np.allclose(content.normals, [0.0, 0.6, 0.8])
 
-    for grid, writer in (
-        (vtk.vtkPolyData(), vtk.vtkXMLPolyDataWriter()),
-        (vtk.vtkUnstructuredGrid(), vtk.vtkXMLUnstructuredGridWriter()),
-    ):
-        places = vtk.vtkPoints()
-        places.SetData(numpy_to_vtk(plate(9000), deep=True))
-        grid.SetPoints(places)
-        grid.GetPointData().SetNormals(numpy_to_vtk(np.tile([0.0, 0.6, 0.8], (9000, 1)), deep=True))
-        writer.SetFileName(str(tmp_path / "a"))
-        writer.SetInputData(grid)
-        {"ascii": writer.SetDataModeToAscii, "binary": writer.SetDataModeToBinary}.get(
-            form, writer.SetDataModeToAppended
-        )()
-        if form == "raw":
-            writer.EncodeAppendedDataOff()
-        (writer.SetCompressorTypeToZLib if form == "zlib" else writer.SetCompressorTypeToNone)()
-        writer.Write()
-        content = read_vtk_xml(tmp_path / "a")
-        np.testing.assert_allclose(content.points, plate(9000), rtol=1e-5 if form == "ascii" else 0)
-        assert content.normals is not None and np.allclose(content.normals, [0.0, 0.6, 0.8])
+
+@pytest.mark.parametrize("packed", ["", "zlib", "lzma"])
+@pytest.mark.parametrize("binary", [True, False])
+def test_files_that_meshio_wrote_are_read(binary: bool, packed: str, tmp_path: Path) -> None:
+    """Of as many points as packed blocks are several for."""
+    mesh = meshio.Mesh(plate(9000), [("triangle", np.arange(9000).reshape(-1, 3))])
+    mesh.write(tmp_path / "a.vtu", binary=binary, **({"compression": packed or None} if binary else {}))
+    np.testing.assert_array_equal(read_vtk_xml(tmp_path / "a.vtu").points, plate(9000))
 
 
 @pytest.mark.parametrize(("code", "unit"), [(0, ""), (1, "inch"), (2, "foot"), (4, "mm"), (5, "cm"), (6, "m")])
@@ -232,3 +227,25 @@ def test_points_of_a_drawing_have_its_unit(code: int, unit: str, tmp_path: Path)
     cloud = st.read_points(tmp_path / "a.dxf")
     np.testing.assert_array_equal(cloud.points + cloud.origin, plate())
     assert cloud.unit == thin_scan(tmp_path / "a.dxf", 1e-3).unit == unit
+
+
+def test_points_within_blocks_of_a_drawing_are_read(tmp_path: Path) -> None:
+    """A survey places a block for each point, a station another with several."""
+    drawing = ezdxf.new()
+    drawing.header["$INSUNITS"] = 6
+    mark, station, empty = (drawing.blocks.new(name) for name in ("MARK", "STATION", "NORTH"))
+    mark.add_point((0, 0, 0))
+    mark.add_circle((0, 0), 0.1)
+    station.add_blockref("MARK", (1, 0, 0))
+    station.add_blockref("MARK", (0, 2, 0))
+    empty.add_line((0, 0), (0, 1))
+    space = drawing.modelspace()
+    for place in plate(50).tolist():
+        space.add_blockref("MARK", place, {"rotation": 30})
+    space.add_blockref("STATION", (10, 20, 5), {"rotation": 90})
+    space.add_blockref("NORTH", (0, 0, 0))
+    drawing.saveas(tmp_path / "a.dxf")
+    cloud = st.read_points(tmp_path / "a.dxf")
+    there = [*plate(50).tolist(), (10, 21, 5), (8, 20, 5)]
+    np.testing.assert_allclose(cloud.points + cloud.origin, there, atol=1e-9)
+    assert "1 other entities of a.dxf are not read" in cloud.notes

@@ -28,7 +28,7 @@ ENUMERATIONS = {
         "System line": "Centre|Top|Bottom|Left|Right|Top left|Top right|Bottom left|Bottom right",
         "Behaviour in analysis": "Standard|Axial force only|Compression only|Tension only",
     },
-    "StructuralPointSupport": {"Type": "Fixed|Hinged|Sliding|Custom"}
+    "StructuralPointSupport": {"Type": "Fixed|Hinged|Sliding|Custom", "Boundary condition": "In node|On beam"}
     | dict.fromkeys("ux uy uz fix fiy fiz".split(), "Rigid|Free|Flexible"),
     "RelConnectsStructuralMember": {"Position": "Begin|End|Both"}
     | dict.fromkeys("ux uy uz fix fiy fiz".split(), "Rigid|Free|Flexible"),
@@ -74,6 +74,28 @@ ENUMERATIONS = {
     },
     "StructuralPointSupportDef": {"Direction": "X|Y|Z|Rx|Ry|Rz"},
 }
+#: sheet -> column and its word, where another column is required
+CONDITIONS = {
+    "StructuralCrossSection": [
+        ("Cross-section type", "Manufactured", "Profile|Form code"),
+        ("Cross-section type", "Parametric", "Shape|Parameters [mm]"),
+    ],
+    "StructuralPointSupport": [("Boundary condition", "In node", "Node")]
+    + [(way, "Flexible", f"Stiffness {axis} [MN/m]") for way, axis in zip(("ux", "uy", "uz"), "XYZ", strict=True)]
+    + [(f"fi{axis}", "Flexible", f"Stiffness Fi{axis} [MNm/rad]") for axis in "xyz"],
+    "RelConnectsStructuralMember": [(f"fi{axis}", "Flexible", f"Stiffness Fi{axis} [MNm/rad]") for axis in "xyz"],
+    "StructuralLoadGroup": [("Load group type", "Variable", "Load type")],
+    "StructuralLoadCase": [("Action type", "Variable", "Duration")],
+    "StructuralPointAction": [("Force action", "In node", "Reference node"), ("Direction", "Vector", "Vector (X;Y;Z) [kN]")]
+    + [("Direction", axis, "Value [kN]") for axis in "XYZ"],
+    "StructuralPointMoment": [("Force action", "In node", "Reference node")],
+    "StructuralCurveAction": [("Force action", "On beam", "Member"), ("Direction", "Vector", "Vector 1(X;Y;Z) [kN/m]")]
+    + [("Direction", axis, "Value 1 [kN/m]") for axis in "XYZ"],
+    "StructuralCurveActionThermal": [("Force action", "On beam", "Member"), ("Variation", "Constant", "deltaT [°C]")],
+    "StructuralPointSupportDef": [("Direction", axis, "Translation value [mm]") for axis in "XYZ"],
+}  # fmt: skip
+#: sheet -> columns that an edition before 2.2.0 had
+REMOVED = {"StructuralCurveMember": {"Begin node", "End node"}}
 #: columns that the guide requires without a condition
 REQUIRED = {
     "StructuralMaterial": "Name|Type|Quality",
@@ -82,7 +104,7 @@ REQUIRED = {
     "StructuralCurveMember": "Name|Cross section|Nodes|Segments|LCS|LCS Rotation [deg]|Coordinate X [m]|Coordinate Y [m]"
     "|Coordinate Z [m]|System line|Analysis Y Eccentricity of Beg Node [mm]|Analysis Z Eccentricity of Beg Node [mm]"
     "|Analysis Y Eccentricity of End Node [mm]|Analysis Z Eccentricity of End Node [mm]|Behaviour in analysis",
-    "StructuralPointSupport": "Name|Node|ux|uy|uz|fix|fiy|fiz",
+    "StructuralPointSupport": "Name|Boundary condition|ux|uy|uz|fix|fiy|fiz",
     "RelConnectsStructuralMember": "Name|Member|Position|ux|uy|uz|fix|fiy|fiz",
     "StructuralLoadGroup": "Name|Load group type|Relation",
     "StructuralLoadCase": "Name|Action type|Load group|Load type",
@@ -118,10 +140,13 @@ def read_saf(path: Path) -> Sheets:
         assert len(set(heads)) == len(heads)
         found = [dict(zip(heads, row, strict=True)) for row in rows[1:]]
         assert len({row["Name"] for row in found}) == len({row["Id"] for row in found}) == len(found)
+        assert not REMOVED.get(sheet.title, set()) & set(heads)
         for row in found:
             for column, words in ENUMERATIONS.get(sheet.title, {}).items():
                 assert row[column] is None or row[column] in words.split("|"), (sheet.title, column, row[column])
             assert all(row[column] is not None for column in REQUIRED[sheet.title].split("|")), (sheet.title, row)
+            for column, word, needed in CONDITIONS.get(sheet.title, []):
+                assert row[column] != word or all(row[each] is not None for each in needed.split("|")), (needed, row)
             for column, value in row.items():
                 if any(
                     f"[{unit}]" in column
@@ -255,6 +280,14 @@ def test_a_program_that_knows_the_guide_alone_finds_the_same_structure(others: d
     for row, each in zip(sheets["StructuralLoadCombination"], truss.combinations, strict=True):
         parts = [(row[f"Load case name {k}"], row[f"Load factor {k}"]) for k in range(1, len(each.factors) + 1)]
         assert row["Name"] == each.name and tuple(parts) == each.factors
+
+
+@pytest.mark.parametrize("section", ["CHS114.3x5", "IPE200", "R100x200"])
+def test_each_kind_of_section_has_the_columns_that_the_guide_requires(section: str, tmp_path: Path) -> None:
+    material = "GL24h" if section.startswith("R") else "S355"
+    st.write(roof(section=section, material=material), tmp_path / "a.saf.xlsx")
+    (row,) = read_saf(tmp_path / "a.saf.xlsx")["StructuralCrossSection"]
+    assert row["Form code"] == (1 if section.startswith("IPE") else None)
 
 
 def test_weight_alone_is_left_to_the_program_that_reads(tmp_path: Path) -> None:

@@ -94,7 +94,8 @@ def convert(values: Namespace) -> None:
         if model.truss is not None and any(out.suffix.lower() == ".json" for out in outs):
             bars.note("the checks of the members are not written again; scantruss structure writes them")
         written = write_models(model, outs, save, bars, style)
-    size = f"{len(model.local):,} nodes, {len(model.members):,} members, {len(model.triangles):,} triangles"
+    panels = "panels" if model.grid is None else model.grid.panels_are
+    size = f"{len(model.local):,} nodes, {len(model.members):,} members, {len(model.panels):,} {panels}"
     print_lines([size, f"wrote {' '.join(map(str, written))}"])
 
 
@@ -109,15 +110,21 @@ def claim_models(outs: list[Path], taken: Taken, *, force: bool, what: str = "re
 
 
 def write_models(
-    model: Model, outs: list[Path], save: SaveTogether, bars: Bars, style: FileStyle | None = None
+    model: Model,
+    outs: list[Path],
+    save: SaveTogether,
+    bars: Bars,
+    style: FileStyle | None = None,
+    *,
+    say_losses: bool = True,
 ) -> list[Path]:
-    """Write a model in several formats, say once what each does not hold, and return the places of all files."""
+    """Write a model in several formats, say once what each does not hold if that is wanted, and return the places of all files."""
     from ..export.formats import losses, write
 
     written: list[Path] = []
     for number, out in enumerate(outs):
         bars("write", number / len(outs))
         written += [out.with_name(file.name) for file in write(model, save.beside(out), style=style)]
-        for note in losses(model, out):
+        for note in losses(model, out) if say_losses else ():
             bars.note_once(note)
     return written

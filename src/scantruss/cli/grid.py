@@ -119,7 +119,8 @@ def grid(values: Namespace) -> None:
     from .convert import write_models
 
     with Bars() as bars, SaveTogether("" if values.force else "result") as save:
-        written = write_models(model_of(result, cloud=cloud), outs, save, bars, style)
+        alone = not any(out.suffix.lower() == ".json" for out in outs)  # that file holds all
+        written = write_models(model_of(result, cloud=cloud), outs, save, bars, style, say_losses=alone)
         save.json(settings_file, (result.settings or settings).to_dict())
         if report is not None and report.suffix.lower() == ".html":
             from ..report.grid_page import encode_grid_report

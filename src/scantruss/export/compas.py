@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..errors import FormatError
+from ..grid.panels import table_of
 from ..runtime.ours import MARK
 from .drawing_in import Drawing
 from .model import Model
 from .style import FileStyle
 
 MESH, GRAPH = "compas.datastructures/Mesh", "compas.datastructures/Graph"
+MOST_WITHIN = 8  #: depth of lists and dictionaries in each other that is looked through
 GRAPHS = (GRAPH, "compas.datastructures/Network")  #: what is read; Network is the older name
 
 
@@ -55,44 +58,67 @@ def encode_compas(model: Model, style: FileStyle) -> bytes:
 
 
 def draw_compas(path: Path) -> Drawing:
-    """Return the faces of the first Mesh of a file, or else the lines of the first Graph."""
+    """Return the faces of the first Mesh of a file, with the lines of the first Graph where that has the same nodes; else these lines.
+
+    What derives from a Mesh or a Graph is one too.
+    """
     try:
         held = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
         raise FormatError(f"{path} cannot be read as COMPAS JSON: {str(error)[:80]}") from None
-    found = [each for each in _typed(held) if each["dtype"] in (MESH, *GRAPHS)]
-    found.sort(key=lambda each: each["dtype"] != MESH)
+    found = list(_typed(held))
+    meshes = [each for each in found if _is_a(each, MESH)]
+    graphs = [each for each in found if not _is_a(each, MESH)]
     if not found:
         raise FormatError(f"{path.name} holds no Mesh and no Graph of COMPAS")
+    read, lines, faces = (meshes or graphs)[0], list[tuple[int, int]](), list[list[int]]()
     try:
-        data: dict[str, Any] = found[0].get("data") or found[0]["value"]
-        points, lines, faces = _parts(data, found[0]["dtype"] == MESH)
-        unit = str(data.get("attributes", {}).get("unit", ""))
+        if meshes:
+            points, faces = _mesh(_data(read))
+            if graphs and len(_data(graphs[0])["node"]) == len(points):
+                ends, lines = _graph(_data(graphs[0]))
+                lines = lines if ends == points else []
+        else:
+            points, lines = _graph(_data(read))
+        unit = str(_data(read).get("attributes", {}).get("unit", ""))
     except (KeyError, TypeError, ValueError, AttributeError):
-        raise FormatError(f"{path.name} is damaged: its {found[0]['dtype']} cannot be understood") from None
-    from .drawing_files import three_corners
-
+        raise FormatError(f"{path.name} is damaged: its {read['dtype']} cannot be understood") from None
+    others = len(found) - 1 - bool(meshes and lines)
+    left = f"; not read: {others:,} more Mesh or Graph" if others else ""
     pairs = np.array(lines, np.int64).reshape(-1, 2)
-    return Drawing(np.array(points, float).reshape(-1, 3), pairs, three_corners(path, faces), unit)
+    return Drawing(np.array(points, float).reshape(-1, 3), pairs, table_of(faces), unit=unit, left=left)
 
 
-CompasParts = tuple[list[tuple[float, ...]], list[tuple[int, int]], list[tuple[int, ...]]]  # points, lines, faces
+def _typed(held: Any, depth: int = 0) -> Iterator[dict[str, Any]]:
+    """Yield the meshes and graphs of a file: it is one, or lists and dictionaries of some."""
+    if isinstance(held, dict) and any(_is_a(held, kind) for kind in (MESH, *GRAPHS)):
+        yield held
+    elif isinstance(held, dict | list) and depth < MOST_WITHIN:
+        for each in held.values() if isinstance(held, dict) else held:
+            yield from _typed(each, depth + 1)
 
 
-def _typed(held: Any) -> list[dict[str, Any]]:
-    """Return the objects of COMPAS in a file: it is one, or a list or dictionary of some."""
-    if isinstance(held, dict) and isinstance(held.get("dtype"), str):
-        return [held]
-    values = held.values() if isinstance(held, dict) else held if isinstance(held, list) else ()
-    return [each for each in values if isinstance(each, dict) and isinstance(each.get("dtype"), str)]
+def _is_a(held: dict[str, Any], kind: str) -> bool:
+    """Return whether an object of COMPAS is of a kind, or of one that derives from it."""
+    inherited = held.get("inheritance")
+    return kind == held.get("dtype") or (isinstance(inherited, list) and kind in inherited)
 
 
-def _parts(data: dict[str, Any], is_mesh: bool) -> CompasParts:
-    nodes = data["vertex" if is_mesh else "node"]
-    number = {key: k for k, key in enumerate(nodes)}
-    points: list[tuple[float, ...]] = [
-        (float(each["x"]), float(each["y"]), float(each.get("z", 0.0))) for each in nodes.values()
-    ]
-    if is_mesh:
-        return points, [], [tuple(number[str(corner)] for corner in face) for face in data["face"].values()]
-    return points, [(number[start], number[end]) for start, ends in data["edge"].items() for end in ends], []
+def _data(held: dict[str, Any]) -> dict[str, Any]:
+    """Return what an object is made of; `value` is the older name."""
+    found: dict[str, Any] = held.get("data") or held["value"]
+    return found
+
+
+def _places(nodes: dict[str, Any]) -> list[tuple[float, ...]]:
+    return [(float(each["x"]), float(each["y"]), float(each.get("z", 0.0))) for each in nodes.values()]
+
+
+def _mesh(data: dict[str, Any]) -> tuple[list[tuple[float, ...]], list[list[int]]]:
+    number = {key: k for k, key in enumerate(data["vertex"])}
+    return _places(data["vertex"]), [[number[str(corner)] for corner in face] for face in data["face"].values()]
+
+
+def _graph(data: dict[str, Any]) -> tuple[list[tuple[float, ...]], list[tuple[int, int]]]:
+    number = {key: k for k, key in enumerate(data["node"])}
+    return _places(data["node"]), [(number[start], number[end]) for start, ends in data["edge"].items() for end in ends]

@@ -13,6 +13,8 @@ from typing import Any
 import numpy as np
 
 from ..grid.grid import Grid
+from .model import Model, members_of
+from .style import FileStyle
 
 Table = tuple[Iterable[str], Iterable[Iterable[Any]]]  # header and rows
 
@@ -22,10 +24,11 @@ def nodes_path(path: Path) -> Path:
     return path.with_name(f"{path.stem}_nodes{path.suffix}")
 
 
-def encode_csv(grid: Grid, path: Path, *, decimal_comma: bool = False) -> dict[Path, bytes]:
+def encode_csv(model: Model, path: Path, style: FileStyle) -> dict[Path, bytes]:
     """Return the two files: members at `path`, nodes beside it; with a decimal comma and semicolons if asked for."""
-    tables = {path: _members(grid), nodes_path(path): _nodes(grid)}
-    return {place: encode_table(*table, decimal_comma=decimal_comma) for place, table in tables.items()}
+    grid = members_of(model, "CSV")
+    tables = {path: _members(grid, model), nodes_path(path): _nodes(grid, model)}
+    return {place: encode_table(*table, decimal_comma=style.decimal_comma) for place, table in tables.items()}
 
 
 def encode_table(header: Iterable[str], rows: Iterable[Iterable[Any]], *, decimal_comma: bool = False) -> bytes:
@@ -48,24 +51,33 @@ def _with_unit(names: str, unit: str) -> list[str]:
     return [f"{name} [{unit}]" if unit else name for name in names.split()]
 
 
-def _members(grid: Grid) -> Table:
-    """Return the table of members: both nodes, their places, the length, whether on a boundary."""
+def _members(grid: Grid, model: Model) -> Table:
+    """Return the table of members: both nodes, their places, the length, whether on a boundary, mark and group."""
     nodes = grid.scan_nodes
     start, end = grid.edges[:, 0], grid.edges[:, 1]
     columns = _with_unit("start_x start_y start_z end_x end_y end_z length", grid.unit)
     places = np.concatenate([nodes[start], nodes[end], grid.lengths[:, None]], axis=1)
     boundary = (grid.edge_uses == 1).astype(int)
-    rows = zip(range(len(start)), start.tolist(), end.tolist(), *places.T.tolist(), boundary.tolist(), strict=True)
-    return (["id", "start", "end", *columns, "boundary"], rows)
+    number = {pair: k for k, pair in enumerate(map(tuple, np.sort(model.members, axis=1).tolist()))}
+    own = [
+        number[pair] for pair in map(tuple, np.sort(grid.edges, axis=1).tolist())
+    ]  # members of layers are in another order there
+    marks, groups = model.member_marks, [model.groups[k] for k in model.group_of.tolist()]
+    rows = zip(
+        range(len(start)), start.tolist(), end.tolist(), *places.T.tolist(), boundary.tolist(), [marks[k] for k in own],
+        [groups[k] for k in own], strict=True,
+    )  # fmt: skip
+    return (["id", "start", "end", *columns, "boundary", "mark", "group"], rows)
 
 
-def _nodes(grid: Grid) -> Table:
-    """Return the table of nodes: place, members there, whether on a boundary, fixed, distance from the scan, fixed lines and ridges."""
+def _nodes(grid: Grid, model: Model) -> Table:
+    """Return the table of nodes: place, members there, whether on a boundary, fixed, mark, distance from the scan, lines and ridges."""
     valence = np.bincount(grid.edges.ravel(), minlength=len(grid.nodes))
     boundary = np.zeros(len(grid.nodes), int)
     boundary[grid.edges[grid.edge_uses == 1].ravel()] = 1
-    header = ["id", *_with_unit("x y z", grid.unit), "valence", "boundary", "fixed"]
-    columns = [*grid.scan_nodes.T.tolist(), valence.tolist(), boundary.tolist(), np.asarray(grid.fixed, int).tolist()]
+    header = ["id", *_with_unit("x y z", grid.unit), "valence", "boundary", "fixed", "mark"]
+    fixed = np.asarray(grid.fixed, int).tolist()
+    columns = [*grid.scan_nodes.T.tolist(), valence.tolist(), boundary.tolist(), fixed, list(model.node_marks)]
     if grid.deviation is not None:
         header += _with_unit("deviation", grid.unit)
         columns.append([None if value != value else value for value in np.asarray(grid.deviation, float).tolist()])

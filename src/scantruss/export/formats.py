@@ -75,15 +75,16 @@ NO_STRUCTURE = "sections, supports, loads or results"
 FORMATS: dict[str, FileFormat] = {
     ".csv": FileFormat(
         "CSV",
-        lambda model, path, style: encode_csv(members_of(model, "CSV"), path, decimal_comma=style.decimal_comma),
+        lambda model, path, style: encode_csv(model, path, style),
+        loses="panels",
         loses_of_structure=NO_STRUCTURE,
     ),
     ".json": FileFormat("JSON", lambda model, path, style: {path: function("json.encode_model")(model)},
                         read=function("json.read_json")),
     ".obj": FileFormat("OBJ", lambda model, path, style: {path: function("obj.encode_obj")(members_of(model, "OBJ"), style.obj)},
-                       draw=function("drawing_files.draw_obj"), loses_of_structure=f"marks, {NO_STRUCTURE}"),
-    ".ply": FileFormat("PLY", lambda model, path, style: {path: function("ply.encode_ply")(model.as_grid("PLY"))},
-                       draw=function("drawing_files.draw_ply"), loses_of_structure=f"marks, {NO_STRUCTURE}"),
+                       draw=function("drawing_files.draw_obj"), loses="marks or groups", loses_of_structure=NO_STRUCTURE),
+    ".ply": FileFormat("PLY", lambda model, path, style: {path: function("ply.encode_ply")(members_of(model, "PLY"))},
+                       draw=function("drawing_files.draw_ply"), loses="marks or groups", loses_of_structure=NO_STRUCTURE),
     ".png": FileFormat("PNG", lambda model, path, style: {
         path: function("drawing.picture.encode_picture")(model.as_grid("PNG"), model.cloud, style=style)}, holds=(GRID,)),
     ".3dm": FileFormat("3DM", one("rhino.encode_3dm"), draw=function("drawing_files.draw_3dm"),
@@ -100,7 +101,7 @@ FORMATS: dict[str, FileFormat] = {
                        loses_of_structure="supports, loads or forces"),
     ".html": FileFormat("HTML", one("page.encode_page"), loses=f"more than {PAGE_POINTS:,} points of the scan", most_points=PAGE_POINTS,
                         loses_of_structure="loads"),
-    ".ifc": FileFormat("IFC", one("ifc.encode_ifc"), needs_unit=True, draw=function("drawing_files.draw_ifc"),
+    ".ifc": FileFormat("IFC", one("ifc.encode_ifc"), needs_unit=True, draw=function("ifc_in.draw_ifc"),
                        reads_with="ifcopenshell", extra="bim"),
     ".inp": FileFormat("Abaqus", one("abaqus.encode_inp"), holds=(STRUCTURE,), loses_of_structure=NO_MARKS),
     ".karamba.json": FileFormat("JSON for Karamba", one("karamba.encode_karamba"), loses_of_structure="releases or results"),
@@ -266,14 +267,14 @@ def read_model(path: str | Path, merge: float | None = None) -> Model:
     ----------
     path : str or Path
         A .json that `scantruss grid` or `scantruss structure` wrote, of which a structure with load cases is solved again; or lines
-        and faces that others drew: .obj, .ply, .dxf, .3dm, .ifc. The notes of the model say what is to be known of these.
+        and faces that others drew: .obj, .ply, .dxf, .3dm, .ifc, .compas.json. The notes of the model say what is to be known of these.
     merge : float, optional
         Distance within which ends of such lines are one node; by default a thousandth of their median length.
 
     Raises
     ------
     FormatError
-        Unknown suffix, an extra that is not installed, or the file cannot be read or is no grid of triangles.
+        Unknown suffix, an extra that is not installed, or the file cannot be read or is no grid.
     """
     path = Path(path)
     known = {suffix: row for suffix, row in FORMATS.items() if row.read or row.draw}

@@ -45,8 +45,8 @@ def encode_geojson(model: Model, style: FileStyle) -> bytes:
     ]
     rows += [
         f'{{"type": "Feature", "properties": {{"kind": "panel", "mark": {mark}}}, '
-        f'"geometry": {{"type": "Polygon", "coordinates": [[{places[a]}, {places[b]}, {places[c]}, {places[a]}]]}}}}'
-        for mark, (a, b, c) in zip(panels, model.triangles.tolist(), strict=True)
+        f'"geometry": {{"type": "Polygon", "coordinates": [[{", ".join(places[k] for k in [*loop, loop[0]])}]]}}}}'
+        for mark, loop in zip(panels, model.panel_loops, strict=True)
     ]
     text = json.dumps(head, ensure_ascii=False)[:-1]
     features = ",\n".join(rows)

@@ -9,7 +9,11 @@ from .obj import header_lines
 
 
 def encode_ply(grid: Grid) -> bytes:
-    """Return a binary little endian PLY file: double coordinates, one `vertex_indices` list per panel."""
+    """Return a binary little endian PLY file: double coordinates, one `vertex_indices` list per panel.
+
+    Members that are sides of no panel, such as those of layers, are edges of `vertex1` and `vertex2`.
+    """
+    edges = grid.edges[grid.edge_uses == 0]
     header = [
         "ply",
         "format binary_little_endian 1.0",
@@ -20,7 +24,9 @@ def encode_ply(grid: Grid) -> bytes:
         "property double z",
         f"element face {len(grid.panel_table)}",
         "property list uchar int vertex_indices",
+        *([f"element edge {len(edges)}", "property int vertex1", "property int vertex2"] if len(edges) else []),
         "end_header",
     ]
     faces = b"".join(bytes([len(loop)]) + np.array(loop, "<i4").tobytes() for loop in grid.panel_loops)
-    return ("\n".join(header) + "\n").encode("ascii") + grid.scan_nodes.astype("<f8").tobytes() + faces
+    head = ("\n".join(header) + "\n").encode("ascii")
+    return head + grid.scan_nodes.astype("<f8").tobytes() + faces + edges.astype("<i4").tobytes()

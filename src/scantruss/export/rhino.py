@@ -18,7 +18,10 @@ DATE = struct.pack("<8i", 0, 0, 0, 1, 0, 80, 2, 0)  #: the first day of 1980
 
 
 def encode_3dm(model: Model, style: FileStyle) -> bytes:
-    """Return a file of Rhino 8 in the unit and the frame of the scan; the faces of the mesh are the panels in their order."""
+    """Return a file of Rhino 8 in the unit and the frame of the scan; the faces of the mesh are the panels in their order.
+
+    Faces have four corners at most: those of panels with more are triangles, and each panel is a closed polyline too.
+    """
     import rhino3dm
 
     file = rhino3dm.File3dm()
@@ -67,6 +70,11 @@ def encode_3dm(model: Model, style: FileStyle) -> bytes:
         for face in faces:
             mesh.Faces.AddFace(*face)
         file.Objects.AddMesh(mesh, attributes("panels", "panels", {"first": model.panel_marks[0]}))
+    for mark, loop in zip(model.panel_marks, model.panel_loops if model.panels.shape[1] > 4 else (), strict=False):
+        outline = rhino3dm.Polyline(len(loop) + 1)
+        for node in (*loop, loop[0]):
+            outline.Add(points[node].X, points[node].Y, points[node].Z)
+        file.Objects.AddPolyline(outline, attributes("outlines of panels", mark, {"mark": mark}))
     return _without_dates(base64.b64decode(file.Encode(rhino3dm.File3dmWriteOptions())))
 
 

@@ -1,8 +1,8 @@
 """SAF, the Structural Analysis Format: a workbook that programs for structural analysis read (saf.guide, version 2.2.0).
 
 A sheet for each kind of object, named as the guide names it, with the guide's columns in its order; units are those of its table.
-Loads on areas are on nodes and members already. Internal forces are left to the program that reads: the guide says their signs in
-pictures only.
+Loads on areas are on nodes and members already. Results are left to the program that reads: the guide says the signs of forces in
+members by a picture alone, and has no sheets of displacements and reactions.
 """
 
 from __future__ import annotations
@@ -40,15 +40,18 @@ SAF_SHEETS: dict[str, tuple[str, ...]] = {  # sheet -> columns
     ),
     "StructuralPointConnection": ("Name", "Coordinate X [m]", "Coordinate Y [m]", "Coordinate Z [m]", "Id"),
     "StructuralCurveMember": (
-        "Name", "Type", "Cross section", "Arbitrary definition", "Nodes", "Segments", "Begin node", "End node", "Internal nodes",
-        "Length [m]", "Geometrical shape", "LCS", "LCS Rotation [deg]", "Coordinate X [m]", "Coordinate Y [m]", "Coordinate Z [m]",
-        "System line", "Structural Y Eccentricity of Beg Node [mm]", "Structural Z Eccentricity of Beg Node [mm]",
+        "Name", "Type", "Cross section", "Arbitrary definition", "Nodes", "Segments", "Internal nodes", "Length [m]",
+        "Geometrical shape", "LCS", "LCS Rotation [deg]", "Coordinate X [m]", "Coordinate Y [m]", "Coordinate Z [m]", "System line",
+        "Structural Y Eccentricity of Beg Node [mm]", "Structural Z Eccentricity of Beg Node [mm]",
         "Structural Y Eccentricity of End Node [mm]", "Structural Z Eccentricity of End Node [mm]",
         "Analysis Y Eccentricity of Beg Node [mm]", "Analysis Z Eccentricity of Beg Node [mm]",
         "Analysis Y Eccentricity of End Node [mm]", "Analysis Z Eccentricity of End Node [mm]",
         "Layer", "Behaviour in analysis", "Color", "Parent ID", "Id",
     ),
-    "StructuralPointSupport": ("Name", "Type", "Node", *WAYS, *STIFFNESSES, "Id"),
+    "StructuralPointSupport": (
+        "Name", "Type", "Boundary condition", "Node", "Member", "Coordinate system", "Origin", "Coordinate definition",
+        "Position x [m]", *WAYS, *STIFFNESSES, "Id",
+    ),
     "RelConnectsStructuralMember": ("Name", "Member", "Position", *WAYS, *STIFFNESSES, "Parent ID", "Id"),
     "StructuralLoadGroup": ("Name", "Load group type", "Relation", "Load type", "Id"),
     "StructuralLoadCase": ("Name", "Description", "Action type", "Load group", "Load type", "Duration", "Id"),
@@ -76,6 +79,7 @@ SAF_SHEETS: dict[str, tuple[str, ...]] = {  # sheet -> columns
 }  # fmt: skip
 SAF_LOAD_TYPES = {"snow": "Snow", "wind": "Wind", "temperature": "Temperature"}  #: load types of variable actions
 SAF_MATERIALS = {"steel": "Steel", "aluminium": "Aluminium", "timber": "Timber"}
+I_SECTION = 1  #: form code of profiles that are symmetric about both axes, typically I sections
 SAF_CATEGORIES = {"ULS": "ULS (Ultimate Limit State)", "SLS": "SLS (Serviceability Limit State)"}
 
 SafRow = dict[str, Any]  # column -> value
@@ -166,7 +170,7 @@ def _material(material: Material) -> SafRow:
 def _section(section: Section, material: str) -> SafRow:
     """Return a section by its shape and dimensions, height along z first; a rolled one by its name."""
     width, depth, wall = (1e3 * value for value in (section.width, section.depth, section.thickness))
-    known: SafRow = {"Cross-section type": "Manufactured", "Profile": section.name}
+    known: SafRow = {"Cross-section type": "Manufactured", "Profile": section.name, "Form code": I_SECTION}
     if section.shape != "I":
         shape, parameters = {
             "CHS": ("Pipe", (width, wall)),
@@ -203,8 +207,6 @@ def _members(model: Model, truss: Truss) -> Iterator[SafRow]:
             "Cross section": names[section],
             "Nodes": f"{marks[start]}; {marks[end]}",
             "Segments": "Line",
-            "Begin node": marks[start],
-            "End node": marks[end],
             "Length [m]": length,
             "Geometrical shape": "Line",
             "LCS": "z by vector",
@@ -234,7 +236,14 @@ def _supports(truss: Truss) -> Iterator[SafRow]:
     for node in np.flatnonzero(truss.supports.any(axis=1)).tolist():
         values = truss.supports[node].tolist()
         kind = kinds.get(tuple(values), "Custom")
-        yield {"Name": f"S {truss.node_marks[node]}", "Type": kind, "Node": truss.node_marks[node]} | _stiffness(values)
+        mark = truss.node_marks[node]
+        yield {
+            "Name": f"S {mark}",
+            "Type": kind,
+            "Boundary condition": "In node",
+            "Node": mark,
+            **_stiffness(values),
+        }
 
 
 def _hinges(truss: Truss) -> Iterator[SafRow]:

@@ -54,11 +54,13 @@ def encode_stl_bodies(model: Model, style: FileStyle) -> bytes:
     """Return a binary STL file in millimetres relative to the origin."""
     bodies = _bodies(model, style, "STL")
     shapes = _shapes(bodies)
-    corners = []
-    for _, shape, frame in _placed_parts(model, bodies):
-        vertices, triangles = shapes[shape]
-        corners.append(((vertices @ frame[:3] + frame[3]) * MILLIMETRES)[triangles].astype(np.float32))
-    return stl_of_corners(np.concatenate(corners), "mm")
+    return stl_of_corners(
+        (
+            ((shapes[shape][0] @ frame[:3] + frame[3]) * MILLIMETRES)[shapes[shape][1]].astype(np.float32)
+            for _, shape, frame in _placed_parts(model, bodies)
+        ),
+        "mm",
+    )
 
 
 def _bodies(model: Model, style: FileStyle, name: str) -> Bodies:

@@ -11,7 +11,7 @@ from __future__ import annotations
 import io
 import math
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +21,9 @@ from ..errors import FormatError
 
 #: 3MF's words for our units; millimeter where it is not known
 UNIT_NAMES = {"mm": "millimeter", "cm": "centimeter", "m": "meter", "inch": "inch", "foot": "foot"}
+STL_TRIANGLE = np.dtype(
+    [("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")]
+)  #: of a binary STL file
 ROUNDS_OF_MOVING = 32  #: of moving apart
 
 CONTENT_TYPES = """<?xml version="1.0" encoding="UTF-8"?>
@@ -183,16 +186,22 @@ def encode_stl(solid: Solid) -> bytes:
     vertices, together = put_on_lattice(solid)
     if together:
         raise FormatError(f"STL cannot hold this solid: {together} vertices coincide in float32; write a .3mf instead")
-    return stl_of_corners(vertices[solid.triangles], solid.unit)
+    return stl_of_corners([vertices[solid.triangles]], solid.unit)
 
 
-def stl_of_corners(corners: np.ndarray, unit: str) -> bytes:
-    """Return the binary STL file of triangles by their corners (T, 3, 3) float32."""
+def stl_of_corners(parts: Iterable[np.ndarray], unit: str) -> bytes:
+    """Return the binary STL file of triangles by their corners (T, 3, 3) float32, part by part so that memory holds them once."""
+    tables = [_stl_table(corners) for corners in parts]
+    header = f"ScanTruss {__version__}, unit: {unit or 'not known'}".encode("ascii").ljust(80)
+    count = sum(map(len, tables)) // STL_TRIANGLE.itemsize
+    return b"".join([header, count.to_bytes(4, "little"), *tables])
+
+
+def _stl_table(corners: np.ndarray) -> bytes:
     wide = corners.astype(np.float64)
     normal = np.cross(wide[:, 1] - wide[:, 0], wide[:, 2] - wide[:, 0])
     length = np.linalg.norm(normal, axis=1, keepdims=True)
-    table = np.zeros(len(corners), np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")]))
+    table = np.zeros(len(corners), STL_TRIANGLE)
     table["normal"] = np.divide(normal, length, out=np.zeros_like(normal), where=length > 0)
     table["corners"] = corners
-    header = f"ScanTruss {__version__}, unit: {unit or 'not known'}".encode("ascii").ljust(80)
-    return header + len(corners).to_bytes(4, "little") + table.tobytes()
+    return table.tobytes()

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import FormatError
 from ..runtime.ours import MARK
 from .model import Model
 from .style import FileStyle
@@ -19,7 +18,6 @@ if TYPE_CHECKING:
     from ..structure.statics import Solution
     from ..structure.truss import LoadCase, Truss
 
-ROWS_OF_SHEET = 1_048_576  #: most rows of a sheet
 FORCE_HEADS = ("Fx [N]", "Fy [N]", "Fz [N]", "Mx [Nm]", "My [Nm]", "Mz [Nm]")
 MOTION_HEADS = ("ux [m]", "uy [m]", "uz [m]", "rx [rad]", "ry [rad]", "rz [rad]")
 STIFFNESS_HEADS = ("ux [N/m]", "uy [N/m]", "uz [N/m]", "rx [Nm/rad]", "ry [Nm/rad]", "rz [Nm/rad]")
@@ -29,23 +27,12 @@ SheetRow = tuple[Any, ...]
 
 
 def encode_xlsx_model(model: Model, style: FileStyle) -> bytes:
-    """Return the workbook; stiffness that is infinite is "rigid".
-
-    Raises
-    ------
-    FormatError
-        A sheet would have more rows than a workbook can hold.
-    """
+    """Return the workbook; stiffness that is infinite is "rigid"."""
     sheets = {"Model": _model_sheet(model), **_geometry(model)}
     if model.truss is not None:
         sheets |= _structure_sheets(model.truss)
     if model.solution is not None:
         sheets |= _result_sheets(model.solution)
-    for name, rows in sheets.items():
-        if len(rows) > ROWS_OF_SHEET:
-            raise FormatError(
-                f"a sheet of XLSX holds {ROWS_OF_SHEET:,} rows and {name} needs {len(rows):,}; write a .json"
-            )
     return encode_workbook(sheets)
 
 
@@ -57,7 +44,7 @@ def _model_sheet(model: Model) -> list[SheetRow]:
         *((f"origin {axis}", value) for axis, value in zip("xyz", model.origin.tolist(), strict=True)),
         ("nodes", len(model.local)),
         ("members", len(model.members)),
-        ("panels", len(model.triangles)),
+        ("panels", len(model.panels)),
     ]
     if model.truss is not None:
         rows += [("joints", "pinned" if model.truss.pinned else "rigid or springs"), ("scale", model.truss.scale)]
@@ -94,8 +81,8 @@ def _geometry(model: Model) -> dict[str, list[SheetRow]]:
         "Nodes": [("node", *(f"{axis}{unit}" for axis in "xyz"), "sets"), *places],
         "Members": [tuple(columns), *zip(*columns.values(), strict=True)],
         "Panels": [
-            ("panel", "node 1", "node 2", "node 3"),
-            *((mark, *(marks[k] for k in nodes)) for mark, nodes in zip(model.panel_marks, model.triangles.tolist(), strict=True)),
+            ("panel", *(f"node {k + 1}" for k in range(model.panels.shape[1]))),
+            *((mark, *(marks[k] for k in loop)) for mark, loop in zip(model.panel_marks, model.panel_loops, strict=True)),
         ],
     }  # fmt: skip
 

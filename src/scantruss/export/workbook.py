@@ -9,8 +9,10 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 from xml.sax.saxutils import escape, quoteattr
 
+from ..errors import FormatError
 from ..runtime.ours import MARK
 
+ROWS_OF_SHEET = 1_048_576  # most rows of a sheet
 NO_DATE = (1980, 1, 1, 0, 0, 0)  # the earliest that a zip file can hold
 QUICK = 1  # level of packing: three times as quick as the usual one, files a fifth larger
 NOT_IN_XML = re.compile("[\x00-\x08\x0b-\x1f\ufffe\uffff]")  # that a name of a line may hold
@@ -52,10 +54,18 @@ def encode_workbook(sheets: Mapping[str, Rows]) -> bytes:
     """Return a plain workbook of sheets, numbers as numbers and text as text, also where it begins with "=".
 
     Written without a library: openpyxl takes four times as long for the 100,000 rows that a structure has in SAF.
+
+    Raises
+    ------
+    FormatError
+        A sheet would have more rows than a workbook can hold.
     """
     texts: dict[str, int] = {}
     main, office = f"{NAMESPACE}/spreadsheetml/2006/main", f"{NAMESPACE}/officeDocument/2006/relationships"
-    parts = {f"xl/worksheets/sheet{number}.xml": _sheet(rows, texts) for number, rows in enumerate(sheets.values(), 1)}
+    parts = {
+        f"xl/worksheets/sheet{number}.xml": _sheet(name, rows, texts)
+        for number, (name, rows) in enumerate(sheets.items(), 1)
+    }
     numbers = range(1, len(sheets) + 1)
     names = [quoteattr(NOT_IN_XML.sub("?", name)) for name in sheets]
     listed = "".join(
@@ -90,7 +100,7 @@ def encode_workbook(sheets: Mapping[str, Rows]) -> bytes:
     return stream.getvalue()
 
 
-def _sheet(rows: Rows, texts: dict[str, int]) -> str:
+def _sheet(name: str, rows: Rows, texts: dict[str, int]) -> str:
     """Return the XML of a sheet; texts are added to those that all sheets share."""
     letters: list[str] = []
     lines = []
@@ -111,6 +121,10 @@ def _sheet(rows: Rows, texts: dict[str, int]) -> str:
             elif value is not None:
                 cells.append(f'<c r="{letters[column]}{number}"><v>{value}</v></c>')
         lines.append(f'<row r="{number}">{"".join(cells)}</row>')
+    if len(lines) > ROWS_OF_SHEET:
+        raise FormatError(
+            f"a sheet of XLSX holds {ROWS_OF_SHEET:,} rows and {name} needs {len(lines):,}; write a .json"
+        )
     main = f"{NAMESPACE}/spreadsheetml/2006/main"
     size = (
         f"A1:{letters[-1] if letters else 'A'}{max(len(lines), 1)}"  # without it some readers cut rows where they end

@@ -22,6 +22,13 @@ from ..errors import FormatError
 from .ours import MARK, check_ours
 from .stopping import is_clean, left_behind, put_into_place, signals_held
 
+#: suffix of another program -> suffix of the format that it reads
+RELATED = {
+    ".dwg": ".dxf", ".dgn": ".dxf", ".rvt": ".ifc", ".igs": ".step", ".iges": ".step", ".sat": ".step", ".gltf": ".glb",
+    ".fbx": ".glb", ".dae": ".glb", ".usdz": ".glb", ".shp": ".geojson", ".gpkg": ".geojson", ".kml": ".geojson", ".ods": ".xlsx",
+    ".sdb": ".s2k", ".gh": ".karamba.json", ".bdf": ".inp",
+}  # fmt: skip
+
 
 def suffix_of(path: Path, suffixes: Collection[str]) -> str:
     """Return which of some suffixes, in lower case, a name ends in, the longest of several; "" for none."""
@@ -32,8 +39,14 @@ def suffix_of(path: Path, suffixes: Collection[str]) -> str:
 
 
 def nearest_suffix(path: Path, suffixes: Collection[str]) -> str:
-    """Return words on which of some suffixes is most like that of a path, to end a message with; "" where none is."""
-    near = get_close_matches(path.suffix.lower(), suffixes, 1, 0.6)
+    """Return words on which of some suffixes is nearest to that of a path, by its letters or by what it is for; "" where none is."""
+    own, both = path.suffix.lower(), "".join(path.suffixes[-2:]).lower()
+    double = [suffix for suffix in suffixes if suffix.count(".") > 1]  # such as .saf.xlsx
+    near = (
+        get_close_matches(both, double, 1, 0.8)
+        or [suffix for suffix in suffixes if suffix == RELATED.get(own)]
+        or get_close_matches(own, suffixes, 1, 0.6)
+    )
     return f"; the nearest is {near[0]}" if near else ""
 
 

@@ -23,6 +23,7 @@ from .ply_header import PLY, Element, PlyHeader, ends_early, read_header
 
 LONGEST_LIST = 1 << 26  # entries
 LISTS_OF_CORNERS = ("vertex_indices", "vertex_index")  # properties of a face
+EDGE_ENDS = ("vertex1", "vertex2")  # properties of an edge
 RUNS_OF_LISTS = 20_000  # changes of list length walked through behind the points
 
 
@@ -65,6 +66,16 @@ def ply_faces(path: Path, header: PlyHeader) -> list[np.ndarray]:
         return _binary_faces(path, header, element) if header.order else _ascii_faces(path, header, element)
     except (FormatError, ValueError):
         return []
+
+
+def ply_edges(path: Path, header: PlyHeader) -> np.ndarray:
+    """Return the (E, 2) edges of a PLY file by their vertices, as programs write lines; FormatError where they are damaged."""
+    element = next((each for each in header.elements if each.name == "edge"), None)
+    own = [] if element is None else [p.name for p in element.properties if not p.count_type]
+    if element is None or not element.count or not set(EDGE_ENDS) <= set(own):
+        return np.empty((0, 2), np.int64)
+    read = _read_binary if header.order else _read_ascii
+    return read(path, header, element, EDGE_ENDS).astype(np.int64)
 
 
 def _binary_faces(path: Path, header: PlyHeader, face: Element) -> list[np.ndarray]:
