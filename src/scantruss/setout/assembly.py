@@ -17,7 +17,7 @@ from scipy.sparse.linalg import splu
 from ..runtime.progress import Progress
 from ..structure.frame import freedoms, stiffness_matrix
 from ..structure.mechanism import softest_motion
-from ..structure.statics import ORDERING, SINGULAR, Factored, solve
+from ..structure.statics import SINGULAR, Factored, solve
 from ..structure.truss import LoadCase, Truss
 
 SHIFT = 1e-13  # of the scaled stiffness, so that a pivot that is nil does not end the elimination
@@ -25,6 +25,7 @@ MOST_TIMES = 2.0  # moves of a step that stands, over those of the whole, ...
 MOST_MOVE = (0.01, 0.1)  # ... but neither less nor more than this over the median length of members
 PROPS_APART = 3.0  # members between props that are set at once
 NONE = np.zeros(0, np.int64)  # no nodes
+ORDERING = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
 LOOSE = 1e-9  # a smaller pivot of the scaled stiffness is one of a motion without resistance
 
 
@@ -136,7 +137,7 @@ def _examine(part: Truss) -> Factored | tuple[np.ndarray, np.ndarray]:
     free = np.flatnonzero(~np.isinf(part.supports[:, :width]).ravel())
     stiffness = stiffness_matrix(part)
     if len(free) == 0:
-        return Factored(part, stiffness, free, np.ones(0), None)
+        return Factored(part, stiffness, free, NONE, np.ones(0), None)
     inner = stiffness[free][:, free]
     diagonal = inner.diagonal()
     root = np.sqrt(np.where(diagonal > 1e-14 * diagonal.max(), diagonal, diagonal.max()))
@@ -147,7 +148,7 @@ def _examine(part: Truss) -> Factored | tuple[np.ndarray, np.ndarray]:
         return np.unique(nil[nil % width < 3] // width), NONE
     value, motion = softest_motion(scaled, factor)
     if value >= 10 * SINGULAR and len(nil) == 0:
-        return Factored(part, stiffness, free, root, factor)
+        return Factored(part, stiffness, free, NONE, root, factor)
     everywhere = np.zeros((len(part.nodes), width))
     everywhere.ravel()[free] = motion / root
     moves, turns = (np.linalg.norm(everywhere[:, k : k + 3], axis=1) for k in (0, 3))

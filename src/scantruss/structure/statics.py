@@ -8,7 +8,6 @@ from functools import cached_property
 
 import numpy as np
 from scipy.sparse import csc_matrix, diags, identity
-from scipy.sparse.linalg import SuperLU, splu
 
 from ..errors import InputError
 from .frame import (
@@ -24,6 +23,7 @@ from .frame import (
 )
 from .mechanism import product, refuse_mechanism, softest_motion
 from .ordering import dissected
+from .substructures import Factor, SingularError, Solver, factor_by_parts
 from .truss import GRAVITY, LoadCase, Truss
 
 SINGULAR = 1e-12  #: smallest eigenvalue of the stiffness, its diagonal scaled to 1, at which a structure is a mechanism
@@ -32,8 +32,6 @@ STIFF = 1e-8  #: smallest eigenvalue that is no mechanism, whatever it is exactl
 REFINED = 1e-11  #: share of the greatest load that a solution may leave
 UNSOLVED = 1e-3  #: share of a load that a factor leaves where it is none
 STATIONS = 9  #: places along a member, both ends included, at which forces are given
-ORDERING = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
-IN_ORDER = {**ORDERING, "permc_spec": "NATURAL"}  #: of displacements that are in a good order already
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,8 +186,9 @@ class Factored:
     truss: Truss
     stiffness: csc_matrix  #: of all displacements, supports not yet held
     free: np.ndarray  #: (F,) numbers of the displacements that are free
+    first: np.ndarray  #: (S + 1,) first of each substructure among these
     root: np.ndarray  #: (F,) square roots of the diagonal, by which it is scaled
-    factor: SuperLU | None  #: of the scaled stiffness of the free displacements; None where all is held
+    factor: Solver | None  #: of the scaled stiffness of the free displacements; None where all is held
 
     def solve(self, loads: np.ndarray) -> np.ndarray:
         """Return the (F, C) free displacements of loads, refined once where they leave more than `REFINED` of the greatest load."""
@@ -220,33 +219,34 @@ def factor_stiffness(truss: Truss) -> Factored:
     stiffness = stiffness_matrix(truss)
     held = np.isinf(truss.supports[:, : freedoms(truss)]).ravel()
     free = np.flatnonzero(~held)
-    free = free[np.argsort(dissected(truss)[free // freedoms(truss)], kind="stable")]
+    rank, first = dissected(truss)
+    rank = rank[free // freedoms(truss)]
+    order = np.argsort(rank, kind="stable")
+    free, first = free[order], np.unique(np.searchsorted(rank[order], first))
     if len(free) == 0:
-        return Factored(truss, stiffness, free, np.ones(0), None)
+        return Factored(truss, stiffness, free, first, np.ones(0), None)
     part = stiffness[free][:, free]
     diagonal = part.diagonal()
     root = np.sqrt(np.where(diagonal > 1e-14 * diagonal.max(), diagonal, diagonal.max()))
     scale = diags(1.0 / root)
     scaled = (scale @ part @ scale).tocsc()
-    factor = _factor_of(scaled)
+    factor = _factor_of(scaled, first)
     value, motion = (0.0, root) if factor is None else softest_motion(scaled, factor, STIFF)
-    if small := value < NEARLY_SINGULAR:  # the factor of a matrix that is nearly singular is not to be trusted
-        factor = splu((scaled + SINGULAR / 10 * identity(len(free))).tocsc(), **IN_ORDER)
-        value, motion = softest_motion(scaled, factor)
-    if value < SINGULAR:
+    if value < NEARLY_SINGULAR:  # the factor of a matrix that is nearly singular is not to be trusted
+        shifted = (scaled + SINGULAR / 10 * identity(len(free))).tocsc()
+        value, motion = softest_motion(scaled, factor_by_parts(shifted, first))
+    if factor is None or value < SINGULAR:
         everywhere = np.zeros(stiffness.shape[0])
         everywhere[free] = motion / root
         refuse_mechanism(truss, everywhere.reshape(len(truss.nodes), -1))
-    if small:
-        factor = splu(scaled, permc_spec="COLAMD")
-    return Factored(truss, stiffness, free, root, factor)
+    return Factored(truss, stiffness, free, first, root, factor)
 
 
-def _factor_of(matrix: csc_matrix) -> SuperLU | None:
+def _factor_of(matrix: csc_matrix, first: np.ndarray) -> Factor | None:
     """Return the factor of a matrix; None where a pivot is nil, or where it does not solve."""
     try:
-        factor = splu(matrix, **IN_ORDER)
-    except RuntimeError:
+        factor = factor_by_parts(matrix, first)
+    except SingularError:
         return None
     loads = np.random.default_rng(2).standard_normal(matrix.shape[0])
     left = matrix @ factor.solve(loads) - loads
