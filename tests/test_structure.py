@@ -435,7 +435,11 @@ def test_nodes_are_eliminated_in_an_order_that_fills_in_little(count: int) -> No
     joined[tuple(truss.members.T)] = joined[tuple(truss.members.T[::-1])] = -1.0
     inorder = np.argsort(rank)
     fill = [
-        len(Substructures.of(csc_matrix(joined[order][:, order]), first).factor(csc_matrix(joined[order][:, order])).values)
+        len(
+            Substructures.of(csc_matrix(joined[order][:, order]), first)
+            .factor(csc_matrix(joined[order][:, order]))
+            .values
+        )
         for order in (np.arange(len(rank)), inorder)
     ]
     assert fill[1] < 0.8 * fill[0] or count < 6

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..kernels.structure.members import beam_forces
+from ..kernels.structure.members import beam_forces, beam_tangents
 from .frame import BEND_Y1, BEND_Z1, BOW, LENGTHEN, TWIST, inner_turns, natural_stiffness
 from .truss import Truss
 
@@ -166,19 +166,15 @@ def respond(
     known = answers if foreseen is None else foreseen
     within = members.bending + (known[:, LENGTHEN] * members.lengths)[:, None, None] * members.bow
     within += stiff[:, :, None] * share[:, :, None] * share[:, None, :]
-    hessian = None
+    derivatives = None
     if tangents:
-        hessian = slope.transpose(0, 2, 1) @ within @ slope
-        hessian[:, :3, :3] += known[:, LENGTHEN, None, None] * plane
-        _add_twist(hessian, known[:, TWIST], first, second)
-        for number, each in enumerate(ends):
-            each.add_bending(hessian, number, known[:, [BEND_Y1 + number, BEND_Z1 + number]], plane, along, length)
-        hessian = hessian.take(_ENDS, axis=1).take(_ENDS, axis=2)
-        hessian *= _SIGNS[:, None] * _SIGNS
+        derivatives = np.empty((len(length), 12, 12))
+        ratios = np.array([each.ratio for each in ends])
+        beam_tangents(within, slope, known, np.array([first, second]), ratios, along, length, derivatives)
     back = slope.transpose(0, 2, 1)
     return Response(
         forces=_times(back, answers)[:, _ENDS] * _SIGNS,
-        tangents=hessian,
+        tangents=derivatives,
         natural=answers,
         strained=_times(back, -(stiff[:, 0] * strain)[:, None] * share)[:, _ENDS] * _SIGNS,
         stiffness=within,
@@ -236,63 +232,6 @@ class _End:
         by_turn = factor * by_turn + more * np.cross(axes[:, :1], along[:, None, :])
         return cls(axes, cosine, ratio, ratio[0][:, None] * sines, by_chord, by_turn)
 
-    def add_bending(
-        self,
-        hessian: np.ndarray,
-        number: int,
-        moments: np.ndarray,
-        plane: np.ndarray,
-        along: np.ndarray,
-        length: np.ndarray,
-    ) -> None:
-        """Add the second derivatives of the angles, times the moments, by chord and turn of this end."""
-        ratio, more, most = self.ratio
-        axis = self.axes[:, 0]
-        across = moments[:, :1] * self.axes[:, 2] - moments[:, 1:] * self.axes[:, 1]
-        sine = _dot(across, along)
-        slope = [  # of cosine and sine
-            np.concatenate([_by_chord(v[:, None], along, length)[:, 0], np.cross(v, along)], axis=1)
-            for v in (axis, across)
-        ]
-        mixed = more[:, None, None] * slope[0][:, :, None] * slope[1][:, None, :]
-        block = mixed + mixed.transpose(0, 2, 1)
-        block += (most * sine)[:, None, None] * slope[0][:, :, None] * slope[0][:, None, :]
-        vector = (more * sine)[:, None] * axis + ratio[
-            :, None
-        ] * across  # its product with the chord has these second derivatives
-        product = _dot(vector, along)
-        flat = vector - product[:, None] * along
-        outer = flat[:, :, None] * along[:, None, :]
-        block[:, :3, :3] -= (outer + outer.transpose(0, 2, 1)) / (length**2)[:, None, None]
-        block[:, :3, :3] -= (product / length)[:, None, None] * plane
-        cross = -plane @ _skew(vector)
-        block[:, :3, 3:] += cross
-        block[:, 3:, :3] += cross.transpose(0, 2, 1)
-        block[:, 3:, 3:] += _both_turned(vector, along)
-        at = np.r_[0:3, 3 + 3 * number : 6 + 3 * number]
-        hessian[:, at[:, None], at] += block
-
-
-def _add_twist(hessian: np.ndarray, moment: np.ndarray, first: np.ndarray, second: np.ndarray) -> None:
-    """Add the second derivatives of the twist, times its moment, by the turns of both ends."""
-    half = moment[:, None, None] / 2
-    own = half * (_both_turned(first[:, 2], second[:, 1]) - _both_turned(first[:, 1], second[:, 2]))
-    one, other = _dot(first[:, 2], second[:, 1]), _dot(first[:, 1], second[:, 2])
-    mixed = (one - other)[:, None, None] * np.eye(3)
-    mixed -= second[:, 1, :, None] * first[:, 2, None, :] - second[:, 2, :, None] * first[:, 1, None, :]
-    mixed *= half
-    hessian[:, 3:6, 3:6] += own
-    hessian[:, 6:, 6:] += own
-    hessian[:, 3:6, 6:] += mixed
-    hessian[:, 6:, 3:6] += mixed.transpose(0, 2, 1)
-
-
-def _both_turned(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Return the second derivatives of the product of two vectors by a rotation vector that turns one of them."""
-    outer = one[:, :, None] * other[:, None, :] / 2
-    made: np.ndarray = outer + outer.transpose(0, 2, 1) - _dot(one, other)[:, None, None] * np.eye(3)
-    return made
-
 
 def _by_chord(vectors: np.ndarray, along: np.ndarray, length: np.ndarray) -> np.ndarray:
     """Return derivatives by the chord of its direction times (M, K, 3) vectors."""
@@ -319,10 +258,3 @@ def _dot(one: np.ndarray, other: np.ndarray) -> np.ndarray:
 def _times(matrices: np.ndarray, vectors: np.ndarray) -> np.ndarray:
     made: np.ndarray = (matrices @ vectors[:, :, None])[:, :, 0]
     return made
-
-
-def _skew(vectors: np.ndarray) -> np.ndarray:
-    """Return the matrices of cross products with vectors on the left."""
-    x, y, z = vectors.T
-    nil = np.zeros_like(x)
-    return np.stack([nil, -z, y, z, nil, -x, -y, x, nil], axis=1).reshape(-1, 3, 3)

@@ -41,7 +41,9 @@ class Substructures:
     first: np.ndarray  #: (S + 1,) first displacement of each part, which are numbered as they are eliminated
     interfaces: list[np.ndarray]  #: of each part (B,) the later displacements that it is joined to, rising
     parts: list[list[int]]  #: of each part those that are condensed on it
-    places: list[np.ndarray]  #: (B,) of each interface among the displacements of the part it is condensed on, then its interface
+    places: list[
+        np.ndarray
+    ]  #: (B,) of each interface among the displacements of the part it is condensed on, then its interface
     begin: np.ndarray  #: (S + 1,) first value of the factor of each part
     pattern: tuple[np.ndarray, np.ndarray]  #: row numbers and column starts of the matrix
     source: np.ndarray  #: which values of the matrix are read: its lower triangle
@@ -124,7 +126,9 @@ class Factor:
     """A factored symmetric matrix."""
 
     parts: Substructures
-    values: np.ndarray  #: of each part L of its own displacements (N, N), then the coupling with its interface (N, B), both by columns
+    values: (
+        np.ndarray
+    )  #: of each part L of its own displacements (N, N), then the coupling with its interface (N, B), both by columns
     signs: np.ndarray  #: (F,) of the pivots
 
     @property
@@ -135,7 +139,15 @@ class Factor:
     def solve(self, loads: np.ndarray) -> np.ndarray:
         """Return the (F,) or (F, C) solutions of right-hand sides."""
         found = np.array(np.atleast_2d(loads.T), np.float64, order="C")
-        solve_factored(self.parts.first, self.parts.begin, self.values, self.signs, *self.parts.outer, np.empty(found.shape[1]), found)
+        solve_factored(
+            self.parts.first,
+            self.parts.begin,
+            self.values,
+            self.signs,
+            *self.parts.outer,
+            np.empty(found.shape[1]),
+            found,
+        )
         return found[0] if loads.ndim == 1 else found.T
 
 

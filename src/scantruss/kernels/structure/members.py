@@ -1,4 +1,4 @@
-"""Forces of co-rotational beams, member by member: what `structure.corotational` says, without tangents."""
+"""Forces and tangents of co-rotational beams, member by member: see `structure.corotational`."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from ...runtime.jit import kernel
 from ..geometry.vectors import Vector, cross, dot, put_vector, row
 
 NATURAL = 6  # deformations of a member: lengthening, twist, both ends about y, both ends about z
+WAYS = 9  # by which it deforms: the chord, the turns of both ends
 
 
 @kernel
@@ -145,3 +146,116 @@ def _gather(slopes: np.ndarray, answers: np.ndarray, forces: np.ndarray) -> None
             start += slopes[k, 1, c] * answers[k]
             end += slopes[k, 2, c] * answers[k]
         forces[c], forces[3 + c], forces[6 + c], forces[9 + c] = -chord, start, chord, end
+
+
+@kernel
+def beam_tangents(
+    within: np.ndarray,
+    slope: np.ndarray,
+    known: np.ndarray,
+    frames: np.ndarray,
+    ratios: np.ndarray,
+    along: np.ndarray,
+    lengths: np.ndarray,
+    tangents: np.ndarray,
+) -> None:
+    """Fill the derivatives (M, 12, 12) of the forces of the nodes on the members by displacements and turns of both ends.
+
+    within : (M, 6, 6) of the natural forces by the deformations; slope : (M, 6, 9) of these by chord and turns; known : (M, 6) forces
+    frames : (2, M, 3, 3) axes of both ends, as rows
+    ratios : (2, 3, M) the angle of an end against the chord over its sine, and derivatives by the cosine
+    along : (M, 3), lengths : (M,) of the chords
+    """
+    half, by_ways = np.empty((NATURAL, WAYS)), np.empty((WAYS, WAYS))
+    for m in range(len(lengths)):
+        for i in range(NATURAL):
+            for b in range(WAYS):
+                half[i, b] = 0.0
+                for k in range(NATURAL):
+                    half[i, b] += within[m, i, k] * slope[m, k, b]
+        for a in range(WAYS):
+            for b in range(a + 1):
+                by_ways[a, b] = 0.0
+                for i in range(NATURAL):
+                    by_ways[a, b] += slope[m, i, a] * half[i, b]
+        chord = row(along, m)
+        for i in range(3):
+            for j in range(i + 1):
+                by_ways[i, j] += known[m, 0] * ((1.0 if i == j else 0.0) - chord[i] * chord[j]) / lengths[m]
+        _add_twisted(frames[0, m], frames[1, m], known[m, 1], by_ways)
+        for end in range(2):
+            moments = known[m, 2 + end], known[m, 4 + end]
+            _add_bent(frames[end, m], moments, ratios[end, :, m], chord, lengths[m], 3 + 3 * end, by_ways)
+        for i in range(12):
+            for j in range(12):
+                a, b = i if i < 6 else i - 6 + 3 * (i // 9), j if j < 6 else j - 6 + 3 * (j // 9)
+                sign = (-1.0 if i < 3 else 1.0) * (-1.0 if j < 3 else 1.0)
+                tangents[m, i, j] = sign * by_ways[max(a, b), min(a, b)]
+
+
+@kernel
+def _add_twisted(first: np.ndarray, second: np.ndarray, moment: float, by_ways: np.ndarray) -> None:
+    """Add the second derivatives of the twist, times its moment, by the turns of both ends: lower triangle."""
+    one, other = dot(row(first, 2), row(second, 1)), dot(row(first, 1), row(second, 2))
+    for i in range(3):
+        for j in range(3):
+            same = (1.0 if i == j else 0.0) * (one - other)
+            outer = first[2, i] * second[1, j] - first[1, i] * second[2, j]
+            back = first[2, j] * second[1, i] - first[1, j] * second[2, i]
+            by_ways[6 + i, 3 + j] += moment / 2 * (same - outer)
+            if j <= i:
+                by_ways[3 + i, 3 + j] += moment / 2 * ((outer + back) / 2 - same)
+                by_ways[6 + i, 6 + j] += moment / 2 * ((outer + back) / 2 - same)
+
+
+@kernel
+def _add_bent(
+    frame: np.ndarray,
+    moments: tuple[float, float],
+    ratio: np.ndarray,
+    along: Vector,
+    length: float,
+    turn: int,
+    by_ways: np.ndarray,
+) -> None:
+    """Add the second derivatives of the angles of an end, times the moments, by the chord and by its turn: lower triangle."""
+    axis = row(frame, 0)
+    y, z = row(frame, 1), row(frame, 2)
+    across = (
+        moments[0] * z[0] - moments[1] * y[0],
+        moments[0] * z[1] - moments[1] * y[1],
+        moments[0] * z[2] - moments[1] * y[2],
+    )
+    cosine, sine = dot(axis, along), dot(across, along)
+    more, most = ratio[1], ratio[2] * sine
+    turned, swung = cross(axis, along), cross(across, along)
+    vector = (  # its product with the chord has the second derivatives that are left
+        more * sine * axis[0] + ratio[0] * across[0],
+        more * sine * axis[1] + ratio[0] * across[1],
+        more * sine * axis[2] + ratio[0] * across[2],
+    )
+    product = dot(vector, along)
+    beside = cross(along, vector)
+    for i in range(3):
+        cosine_i, sine_i = (axis[i] - cosine * along[i]) / length, (across[i] - sine * along[i]) / length
+        for j in range(3):
+            cosine_j, sine_j = (axis[j] - cosine * along[j]) / length, (across[j] - sine * along[j]) / length
+            same = 1.0 if i == j else 0.0
+            if j <= i:
+                flat = (vector[i] - product * along[i]) * along[j] + (vector[j] - product * along[j]) * along[i]
+                by_ways[i, j] += more * (cosine_i * sine_j + sine_i * cosine_j) + most * cosine_i * cosine_j
+                by_ways[i, j] -= (flat + product * (same - along[i] * along[j])) / length**2
+                by_ways[turn + i, turn + j] += (
+                    more * (turned[i] * swung[j] + swung[i] * turned[j])
+                    + most * turned[i] * turned[j]
+                    + (vector[i] * along[j] + vector[j] * along[i]) / 2
+                    - product * same
+                )
+            by_ways[turn + i, j] += (
+                more * (turned[i] * sine_j + swung[i] * cosine_j)
+                + most * turned[i] * cosine_j
+                + along[j] * beside[i] / length
+            )
+            if i != j:  # of the cross product of the turn with the vector
+                third = 3 - i - j
+                by_ways[turn + i, j] -= (1.0 if (i - j) % 3 == 2 else -1.0) * vector[third] / length

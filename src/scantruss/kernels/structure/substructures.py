@@ -105,8 +105,11 @@ def _part(
 ) -> tuple[int, int, np.ndarray, np.ndarray]:
     count, wide = first[s + 1] - first[s], outer_first[s + 1] - outer_first[s]
     middle = begin[s] + count * count
-    return count, wide, values[begin[s] : middle].reshape(count, count), values[middle : begin[s + 1]].reshape(
-        count, wide
+    return (
+        count,
+        wide,
+        values[begin[s] : middle].reshape(count, count),
+        values[middle : begin[s + 1]].reshape(count, wide),
     )
 
 
