@@ -2,24 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
-from threading import Lock
+from threading import RLock
 from typing import Any
 
 from threadpoolctl import ThreadpoolController
-
-
-class _Users:
-    """Who asks for one thread at this moment; the limit is of the whole process."""
-
-    def __init__(self) -> None:
-        self.lock, self.count = Lock(), 0
-        self.limit: Any = None
-
-
-_USERS = _Users()
 
 
 @cache
@@ -28,17 +18,18 @@ def _libraries() -> ThreadpoolController:
     return ThreadpoolController()
 
 
+@cache
+def _turn() -> Any:
+    """Held by who has the one thread: the limit is of the whole process, and must not end while another needs it."""
+    return RLock()
+
+
 @contextmanager
 def one_blas_thread() -> Iterator[None]:
-    """Let BLAS use one thread within; as many as before once the last user is done."""
-    with _USERS.lock:
-        _USERS.count += 1
-        if _USERS.count == 1:
-            _USERS.limit = _libraries().limit(limits=1, user_api="blas")
-    try:
+    """Let BLAS use one thread within; others that ask for it wait meanwhile."""
+    with _turn(), _libraries().limit(limits=1, user_api="blas"):
         yield
-    finally:
-        with _USERS.lock:
-            _USERS.count -= 1
-            if _USERS.count == 0:
-                _USERS.limit.restore_original_limits()
+
+
+if hasattr(os, "register_at_fork"):  # a forked process has none of the threads that may hold it
+    os.register_at_fork(after_in_child=_turn.cache_clear)
