@@ -10,21 +10,21 @@ from scipy.sparse import csc_matrix
 
 from ..errors import InputError
 from ..kernels.geometry.components import component_labels
-from .substructures import Solver
+from .substructures import Factor
 from .truss import Truss
 
 MOST_NAMED = 4  #: nodes of a mechanism that are named
 INVERSE_STEPS = 6  #: of inverse iteration, which converges in two where an eigenvalue is nil
 
 
-def softest_motion(stiffness: csc_matrix, factor: Solver, stiff: float = math.inf) -> tuple[float, np.ndarray]:
+def softest_motion(stiffness: csc_matrix, factor: Factor, stiff: float = math.inf) -> tuple[float, np.ndarray]:
     """Return the smallest eigenvalue of a stiffness matrix, or one little above it, with its motion: inverse iteration.
 
     Parameters
     ----------
     stiffness : (F, F) sparse matrix
         Symmetric, not negative, diagonal 1.
-    factor : Solver
+    factor : Factor
         Of that matrix, or of one shifted a little.
     stiff : float
         Eigenvalue that matters no more: once all are seen to be larger the value is only some larger one.

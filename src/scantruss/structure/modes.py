@@ -19,7 +19,7 @@ from .frame import BEND_Y1, BEND_Z1, BOW, LENGTHEN, assemble, freedoms, inner_tu
 from .lanczos import largest_eigenpairs
 from .mechanism import product
 from .statics import CaseResult, Factored, Solution
-from .substructures import SingularError, Solver, factor_by_parts
+from .substructures import Factor, SingularError, factor_by_parts
 from .truss import GRAVITY, Truss
 
 FEW_FREEDOMS = 200  #: up to which all modes are found at once by dense matrices
@@ -153,7 +153,7 @@ def _of_many(part: csc_matrix, stiff: csc_matrix, factored: Factored, count: int
 
 
 def _of_factor(
-    part: csc_matrix, stiff: csc_matrix, factor: Solver, count: int, tolerance: float
+    part: csc_matrix, stiff: csc_matrix, factor: Factor, count: int, tolerance: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return `count` largest eigenpairs of the factored matrix alone, by ARPACK where they lie too close together."""
     found = largest_eigenpairs(factor, part, stiff, count, tolerance, block=min(count, 2))
@@ -174,7 +174,7 @@ def _largest(factored: Factored, matrix: csc_matrix, count: int) -> tuple[np.nda
     part = (scale @ matrix[free][:, free] @ scale).tocsc()
     if factored.factor is None or not np.any(part.data):
         return np.zeros(0), np.zeros((0, nodes, 3))
-    stiff = (scale @ factored.stiffness[free][:, free] @ scale).tocsc()
+    stiff = factored.scaled
     if len(free) <= max(FEW_FREEDOMS, 3 * count):
         values, vectors = eigh(part.toarray(), stiff.toarray())
     else:

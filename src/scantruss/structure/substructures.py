@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 from scipy.linalg.blas import dsyrk, dtrsm
@@ -21,13 +20,6 @@ from ..kernels.structure.substructures import add_condensed, signed_cholesky, so
 from ..runtime.blas import one_blas_thread
 
 SMALL_BLOCK = 48  #: rows of a block that is factored with signs at once; a larger one is halved
-
-
-class Solver(Protocol):
-    """A factored matrix."""
-
-    def solve(self, loads: np.ndarray, /) -> np.ndarray:
-        """Return the (F,) or (F, C) solutions of right-hand sides."""
 
 
 class SingularError(ArithmeticError):
@@ -61,7 +53,9 @@ class Substructures:
         target = np.empty(len(source), np.int64)
         begin = np.zeros(parts + 1, np.int64)
         local = np.empty(count, np.int64)
-        interfaces, children, places = [], [[] for _ in range(parts)], [np.zeros(0, np.int64)] * parts
+        interfaces: list[np.ndarray] = []
+        children: list[list[int]] = [[] for _ in range(parts)]
+        places = [np.zeros(0, np.int64)] * parts
         for part in range(parts):
             start, end = first[part], first[part + 1]
             mine = slice(ranges[part], ranges[part + 1])
@@ -135,6 +129,14 @@ class Factor:
     def negative(self) -> int:
         """How many eigenvalues of the matrix are negative."""
         return int((self.signs < 0).sum())
+
+    @property
+    def pivots(self) -> np.ndarray:
+        """(F,) what is left of the diagonal, once all before are condensed on it."""
+        own = np.diff(self.parts.first)
+        number = np.arange(len(self.signs)) - np.repeat(self.parts.first[:-1], own)
+        diagonal = self.values[np.repeat(self.parts.begin[:-1], own) + number * (np.repeat(own, own) + 1)]
+        return self.signs * diagonal**2
 
     def solve(self, loads: np.ndarray) -> np.ndarray:
         """Return the (F,) or (F, C) solutions of right-hand sides."""

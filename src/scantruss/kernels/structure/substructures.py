@@ -35,7 +35,7 @@ def add_condensed(
 
 @kernel
 def signed_cholesky(matrix: np.ndarray, signs: np.ndarray) -> bool:
-    """Replace a symmetric (N, N) matrix by L, which with diagonal signs S makes it L S L^T, and fill in these (N,); False if a pivot is nil."""
+    """Replace a symmetric (N, N) matrix by L, and fill the signs (N,) of a diagonal S: it is L S L^T; False where a pivot is nil."""
     count = len(matrix)
     for j in range(count):
         pivot = matrix[j, j]
