@@ -8,7 +8,7 @@ from ...runtime.jit import kernel
 from ..geometry.vectors import Vector, cross, dot, put_vector, row
 
 NATURAL = 6  # deformations of a member: lengthening, twist, both ends about y, both ends about z
-WAYS = 9  # by which it deforms: the chord, the turns of both ends
+MEMBER_WAYS = 9  # by which it deforms: the chord, the turns of both ends
 
 
 @kernel
@@ -166,14 +166,14 @@ def beam_tangents(
     ratios : (2, 3, M) the angle of an end against the chord over its sine, and derivatives by the cosine
     along : (M, 3), lengths : (M,) of the chords
     """
-    half, by_ways = np.empty((NATURAL, WAYS)), np.empty((WAYS, WAYS))
+    half, by_ways = np.empty((NATURAL, MEMBER_WAYS)), np.empty((MEMBER_WAYS, MEMBER_WAYS))
     for m in range(len(lengths)):
         for i in range(NATURAL):
-            for b in range(WAYS):
+            for b in range(MEMBER_WAYS):
                 half[i, b] = 0.0
                 for k in range(NATURAL):
                     half[i, b] += within[m, i, k] * slope[m, k, b]
-        for a in range(WAYS):
+        for a in range(MEMBER_WAYS):
             for b in range(a + 1):
                 by_ways[a, b] = 0.0
                 for i in range(NATURAL):
