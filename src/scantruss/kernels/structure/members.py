@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ...runtime.jit import kernel
@@ -35,27 +37,115 @@ def beam_forces(
     least = 1.0
     deformed, answers, shares = np.empty(NATURAL), np.empty(NATURAL), np.empty(NATURAL)
     slopes = np.zeros((NATURAL, 3, 3))  # of each deformation by the chord and the turns of both ends
-    frames = np.empty((2, 3, 3))
+    frames, ratios = np.empty((2, 3, 3)), np.empty((2, 3))
     for m in range(len(ends)):
-        moved = row(moves, ends[m, 1]), row(moves, ends[m, 0])
-        change = moved[0][0] - moved[1][0], moved[0][1] - moved[1][1], moved[0][2] - moved[1][2]
-        before = row(chords, m)
-        chord = before[0] + change[0], before[1] + change[1], before[2] + change[2]
-        first, length = np.sqrt(dot(before, before)), np.sqrt(dot(chord, chord))
-        along = chord[0] / length, chord[1] / length, chord[2] / length
-        both = before[0] + chord[0], before[1] + chord[1], before[2] + chord[2]
-        deformed[0] = dot(change, both) / (length + first)
-        put_vector(slopes[0, 0], 0, along)
-        for end in range(2):
-            _turn(axes[m], turns[ends[m, end]], frames[end])
-            cosine = _bend(frames[end], along, length, series, end, deformed, slopes)
-            least = min(least, cosine)
-        _twist(frames, deformed, slopes)
-        _answer(bending[m], bow[m], axial[m], first, strain[m], deformed, shares, answers)
+        shape = _deform(ends[m], row(chords, m), axes[m], series, moves, turns, frames, ratios, deformed, slopes)
+        least = min(least, shape.cosine)
+        _answer(bending[m], bow[m], axial[m], shape.first, strain[m], deformed, shares, answers)
         for k in range(NATURAL):
             natural[m, k] = answers[k]
         _gather(slopes, answers, forces[m])
     return least
+
+
+@kernel
+def beam_tangents(
+    ends: np.ndarray,
+    chords: np.ndarray,
+    axes: np.ndarray,
+    axial: np.ndarray,
+    bending: np.ndarray,
+    bow: np.ndarray,
+    series: np.ndarray,
+    moves: np.ndarray,
+    turns: np.ndarray,
+    strain: np.ndarray,
+    factor: float,
+    foreseen: np.ndarray,
+    natural: np.ndarray,
+    forces: np.ndarray,
+    strained: np.ndarray,
+    stiffness: np.ndarray,
+    slope: np.ndarray,
+    tangents: np.ndarray,
+) -> float:
+    """Fill what `beam_forces` does with its derivatives; returns the least cosine of an end's turn.
+
+    strain is there `factor` times; what is not said here is as there
+    foreseen : (M, 6) natural forces for the tangents, or none: those that are found
+    strained : (M, 12) derivatives of the forces by the factor; stiffness : (M, 6, 6) of the natural forces by the deformations
+    slope : (M, 6, 9) of these by the chord and the turns of both ends
+    tangents : (M, 12, 12) of the forces by displacements and turns of both ends; none if they are not wanted
+    """
+    least = 1.0
+    deformed, answers, shares = np.empty(NATURAL), np.empty(NATURAL), np.empty(NATURAL)
+    slopes = np.zeros((NATURAL, 3, 3))
+    frames, ratios, by_ways = np.empty((2, 3, 3)), np.empty((2, 3)), np.empty((MEMBER_WAYS, MEMBER_WAYS))
+    for m in range(len(ends)):
+        shape = _deform(ends[m], row(chords, m), axes[m], series, moves, turns, frames, ratios, deformed, slopes)
+        least = min(least, shape.cosine)
+        _answer(bending[m], bow[m], axial[m], shape.first, factor * strain[m], deformed, shares, answers)
+        for k in range(NATURAL):
+            natural[m, k] = answers[k]
+            for way in range(MEMBER_WAYS):
+                slope[m, k, way] = slopes[k, way // 3, way % 3]
+        _gather(slopes, answers, forces[m])
+        for k in range(NATURAL):
+            answers[k] = -axial[m] * shape.first * strain[m] * shares[k]
+        _gather(slopes, answers, strained[m])
+        known = foreseen[m] if len(foreseen) else natural[m]
+        for i in range(NATURAL):
+            for k in range(NATURAL):
+                stiffness[m, i, k] = bending[m, i, k] + known[0] * shape.first * bow[m, i, k]
+                stiffness[m, i, k] += axial[m] * shape.first * shares[i] * shares[k]
+        if len(tangents):
+            _add_stiffness(stiffness[m], slope[m], by_ways)
+            _add_turned(known[0], shape.along, shape.length, by_ways)
+            _add_twisted(frames[0], frames[1], known[1], by_ways)
+            for end in range(2):
+                moments = known[2 + end], known[4 + end]
+                _add_bent(frames[end], moments, ratios[end], shape.along, shape.length, 3 + 3 * end, by_ways)
+            _spread(by_ways, tangents[m])
+    return least
+
+
+class Shape(NamedTuple):
+    """How a member stands."""
+
+    cosine: float  # the least of an end's turn against the chord
+    first: float  # length without loads
+    length: float
+    along: Vector
+
+
+@kernel
+def _deform(
+    ends: np.ndarray,
+    before: Vector,
+    axes: np.ndarray,
+    series: np.ndarray,
+    moves: np.ndarray,
+    turns: np.ndarray,
+    frames: np.ndarray,
+    ratios: np.ndarray,
+    deformed: np.ndarray,
+    slopes: np.ndarray,
+) -> Shape:
+    """Fill the axes of both ends, the deformations with their slopes, and of each angle over its sine the derivatives by the cosine."""
+    moved = row(moves, ends[1]), row(moves, ends[0])
+    change = moved[0][0] - moved[1][0], moved[0][1] - moved[1][1], moved[0][2] - moved[1][2]
+    chord = before[0] + change[0], before[1] + change[1], before[2] + change[2]
+    first, length = np.sqrt(dot(before, before)), np.sqrt(dot(chord, chord))
+    along = chord[0] / length, chord[1] / length, chord[2] / length
+    both = before[0] + chord[0], before[1] + chord[1], before[2] + chord[2]
+    deformed[0] = dot(change, both) / (length + first)
+    put_vector(slopes[0, 0], 0, along)
+    least = 1.0
+    for end in range(2):
+        _turn(axes, turns[ends[end]], frames[end])
+        least = min(least, _bend(frames[end], along, length, series, end, ratios[end], deformed, slopes))
+    _twist(frames, deformed, slopes)
+    return Shape(least, first, length, along)
 
 
 @kernel
@@ -73,6 +163,7 @@ def _bend(
     length: float,
     series: np.ndarray,
     end: int,
+    ratios: np.ndarray,
     deformed: np.ndarray,
     slopes: np.ndarray,
 ) -> float:
@@ -80,10 +171,12 @@ def _bend(
     axis = row(frame, 0)
     cosine = dot(axis, along)
     gap = 1.0 - cosine
-    ratio, more = 0.0, 0.0  # angle over its sine, and its derivative by the gap
+    ratio, more, most = 0.0, 0.0, 0.0  # angle over its sine, and its derivatives by the gap
     for k in range(len(series) - 1, -1, -1):
+        most = most * gap + 2 * more
         more = more * gap + ratio
         ratio = ratio * gap + series[k]
+    ratios[0], ratios[1], ratios[2] = ratio, -more, most
     turned = cross(axis, along)
     for number in range(2):
         sign = 1.0 - 2.0 * number
@@ -149,48 +242,26 @@ def _gather(slopes: np.ndarray, answers: np.ndarray, forces: np.ndarray) -> None
 
 
 @kernel
-def beam_tangents(
-    within: np.ndarray,
-    slope: np.ndarray,
-    known: np.ndarray,
-    frames: np.ndarray,
-    ratios: np.ndarray,
-    along: np.ndarray,
-    lengths: np.ndarray,
-    tangents: np.ndarray,
-) -> None:
-    """Fill the derivatives (M, 12, 12) of the forces of the nodes on the members by displacements and turns of both ends.
+def _add_stiffness(stiffness: np.ndarray, slope: np.ndarray, by_ways: np.ndarray) -> None:
+    """Fill the derivatives (9, 9) of the forces by chord and turns that come of the stiffness: lower triangle."""
+    for a in range(MEMBER_WAYS):
+        for b in range(a + 1):
+            by_ways[a, b] = 0.0
+    for i in range(NATURAL):
+        for b in range(MEMBER_WAYS):
+            half = 0.0
+            for k in range(NATURAL):
+                half += stiffness[i, k] * slope[k, b]
+            for a in range(b, MEMBER_WAYS):
+                by_ways[a, b] += slope[i, a] * half
 
-    within : (M, 6, 6) of the natural forces by the deformations; slope : (M, 6, 9) of these by chord and turns; known : (M, 6) forces
-    frames : (2, M, 3, 3) axes of both ends, as rows
-    ratios : (2, 3, M) the angle of an end against the chord over its sine, and derivatives by the cosine
-    along : (M, 3), lengths : (M,) of the chords
-    """
-    half, by_ways = np.empty((NATURAL, MEMBER_WAYS)), np.empty((MEMBER_WAYS, MEMBER_WAYS))
-    for m in range(len(lengths)):
-        for i in range(NATURAL):
-            for b in range(MEMBER_WAYS):
-                half[i, b] = 0.0
-                for k in range(NATURAL):
-                    half[i, b] += within[m, i, k] * slope[m, k, b]
-        for a in range(MEMBER_WAYS):
-            for b in range(a + 1):
-                by_ways[a, b] = 0.0
-                for i in range(NATURAL):
-                    by_ways[a, b] += slope[m, i, a] * half[i, b]
-        chord = row(along, m)
-        for i in range(3):
-            for j in range(i + 1):
-                by_ways[i, j] += known[m, 0] * ((1.0 if i == j else 0.0) - chord[i] * chord[j]) / lengths[m]
-        _add_twisted(frames[0, m], frames[1, m], known[m, 1], by_ways)
-        for end in range(2):
-            moments = known[m, 2 + end], known[m, 4 + end]
-            _add_bent(frames[end, m], moments, ratios[end, :, m], chord, lengths[m], 3 + 3 * end, by_ways)
-        for i in range(12):
-            for j in range(12):
-                a, b = i if i < 6 else i - 6 + 3 * (i // 9), j if j < 6 else j - 6 + 3 * (j // 9)
-                sign = (-1.0 if i < 3 else 1.0) * (-1.0 if j < 3 else 1.0)
-                tangents[m, i, j] = sign * by_ways[max(a, b), min(a, b)]
+
+@kernel
+def _add_turned(force: float, along: Vector, length: float, by_ways: np.ndarray) -> None:
+    """Add the second derivatives of the length, times the axial force, by the chord: lower triangle."""
+    for i in range(3):
+        for j in range(i + 1):
+            by_ways[i, j] += force * ((1.0 if i == j else 0.0) - along[i] * along[j]) / length
 
 
 @kernel
@@ -259,3 +330,13 @@ def _add_bent(
             if i != j:  # of the cross product of the turn with the vector
                 third = 3 - i - j
                 by_ways[turn + i, j] -= (1.0 if (i - j) % 3 == 2 else -1.0) * vector[third] / length
+
+
+@kernel
+def _spread(by_ways: np.ndarray, tangents: np.ndarray) -> None:
+    """Fill the derivatives (12, 12) by displacements and turns of both ends of those by chord and turns: the chord is a difference."""
+    for i in range(12):
+        for j in range(12):
+            a, b = i if i < 6 else i - 6 + 3 * (i // 9), j if j < 6 else j - 6 + 3 * (j // 9)
+            sign = (-1.0 if i < 3 else 1.0) * (-1.0 if j < 3 else 1.0)
+            tangents[i, j] = sign * by_ways[max(a, b), min(a, b)]
