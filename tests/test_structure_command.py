@@ -308,6 +308,11 @@ def test_what_cannot_be_used_is_one_line(
         ("scale =", "is not TOML"),
         ("[[combinations]]\nname = 'a'", "a combination that cannot be used: no factors"),
         ("[[combinations]]\nname = 'a'\nfactors = { none = 1.0 }", "names no load case 'none'"),
+        (
+            "[[combinations]]\nname = 'a'\nfactors = { self = nan }",
+            "factors must be one finite number or more, got {'self': nan}",
+        ),
+        ("[[combinations]]\nname = 'a'\nfactors = {}", "factors must be one finite number or more, got {}"),
         ("[[loads]]\nforce = [0, 0]\nnodes = 'N001'", "needs three numbers"),
         ("[[loads]]\nforce = [0, 0, 1]", "needs nodes"),
         ("[[loads]]\nforce = [0, 0, 1]\nnodes = ['N900']", "the load 'point' names nodes that are not there: 'N900'"),
