@@ -132,20 +132,21 @@ def respond(
     if members.bending.shape[1] == 1:
         return _bars(members, moves, strain, factor, foreseen)
     count = len(members.ends)
+    derivatives = np.empty((count if tangents else 0, 12, 12))
     made = Response(
         natural=np.empty((count, 6)),
         forces=np.empty((count, 12)),
         strained=np.empty((count, 12)),
         stiffness=np.empty((count, 6, 6)),
         slope=np.empty((count, 6, 9)),
-        tangents=np.empty((count if tangents else 0, 12, 12)),
+        tangents=derivatives if tangents else None,
         too_far=False,
     )
     shape = members.ends, members.chords, members.axes, members.axial, members.bending, members.bow
     known = np.empty((0, 6)) if foreseen is None else foreseen
-    filled = made.natural, made.forces, made.strained, made.stiffness, made.slope, made.tangents
+    filled = made.natural, made.forces, made.strained, made.stiffness, made.slope, derivatives
     least = beam_tangents(*shape, _SERIES, moves, turns, strain, float(factor), known, *filled)
-    return replace(made, tangents=made.tangents if tangents else None, too_far=bool(least < FARTHEST_TURN))
+    return replace(made, too_far=bool(least < FARTHEST_TURN))
 
 
 def _bars(
