@@ -210,6 +210,15 @@ def test_supports_of_a_file_are_the_nearest_nodes(place: Path) -> None:
     assert np.flatnonzero(held).tolist() == [0, 6, 42, 48]
 
 
+def test_a_position_that_is_no_number_supports_nothing(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Nothing is nearest to it, so no node is taken for it."""
+    x, y, z = st.read_grid("grid.json").scan_nodes[0]
+    Path("feet.csv").write_text(f"{x},{y},{z}\nnan,{y},{z}\n")
+    assert run("structure grid.json out.json --supports feet.csv") == 2
+    assert "feet.csv, line 2: needs three finite numbers X,Y,Z" in capsys.readouterr().err
+    assert not Path("out.json").exists()
+
+
 def test_a_unit_can_be_given_where_the_grid_has_none(place: Path) -> None:
     assert run("structure nounit.json out.json --scale 50 --unit mm") == 0
     assert st.read_structure("out.json").lengths.mean() == pytest.approx(2.0, rel=0.05)
