@@ -39,9 +39,9 @@ def beam_forces(
     slopes = np.zeros((NATURAL, 3, 3))  # of each deformation by the chord and the turns of both ends
     frames, ratios = np.empty((2, 3, 3)), np.empty((2, 3))
     for m in range(len(ends)):
-        shape = _deform(ends[m], row(chords, m), axes[m], series, moves, turns, frames, ratios, deformed, slopes)
-        least = min(least, shape.cosine)
-        _answer(bending[m], bow[m], axial[m], shape.first, strain[m], deformed, shares, answers)
+        chord = _deform(ends[m], row(chords, m), axes[m], series, moves, turns, frames, ratios, deformed, slopes)
+        least = min(least, chord.cosine)
+        _answer(bending[m], bow[m], axial[m], chord.first, strain[m], deformed, shares, answers)
         for k in range(NATURAL):
             natural[m, k] = answers[k]
         _gather(slopes, answers, forces[m])
@@ -82,35 +82,35 @@ def beam_tangents(
     slopes = np.zeros((NATURAL, 3, 3))
     frames, ratios, by_ways = np.empty((2, 3, 3)), np.empty((2, 3)), np.empty((MEMBER_WAYS, MEMBER_WAYS))
     for m in range(len(ends)):
-        shape = _deform(ends[m], row(chords, m), axes[m], series, moves, turns, frames, ratios, deformed, slopes)
-        least = min(least, shape.cosine)
-        _answer(bending[m], bow[m], axial[m], shape.first, factor * strain[m], deformed, shares, answers)
+        chord = _deform(ends[m], row(chords, m), axes[m], series, moves, turns, frames, ratios, deformed, slopes)
+        least = min(least, chord.cosine)
+        _answer(bending[m], bow[m], axial[m], chord.first, factor * strain[m], deformed, shares, answers)
         for k in range(NATURAL):
             natural[m, k] = answers[k]
             for way in range(MEMBER_WAYS):
                 slope[m, k, way] = slopes[k, way // 3, way % 3]
         _gather(slopes, answers, forces[m])
         for k in range(NATURAL):
-            answers[k] = -axial[m] * shape.first * strain[m] * shares[k]
+            answers[k] = -axial[m] * chord.first * strain[m] * shares[k]
         _gather(slopes, answers, strained[m])
         known = foreseen[m] if len(foreseen) else natural[m]
         for i in range(NATURAL):
             for k in range(NATURAL):
-                stiffness[m, i, k] = bending[m, i, k] + known[0] * shape.first * bow[m, i, k]
-                stiffness[m, i, k] += axial[m] * shape.first * shares[i] * shares[k]
+                stiffness[m, i, k] = bending[m, i, k] + known[0] * chord.first * bow[m, i, k]
+                stiffness[m, i, k] += axial[m] * chord.first * shares[i] * shares[k]
         if len(tangents):
             _add_stiffness(stiffness[m], slope[m], by_ways)
-            _add_turned(known[0], shape.along, shape.length, by_ways)
+            _add_turned(known[0], chord.along, chord.length, by_ways)
             _add_twisted(frames[0], frames[1], known[1], by_ways)
             for end in range(2):
                 moments = known[2 + end], known[4 + end]
-                _add_bent(frames[end], moments, ratios[end], shape.along, shape.length, 3 + 3 * end, by_ways)
+                _add_bent(frames[end], moments, ratios[end], chord.along, chord.length, 3 + 3 * end, by_ways)
             _spread(by_ways, tangents[m])
     return least
 
 
-class Shape(NamedTuple):
-    """How a member stands."""
+class Chord(NamedTuple):
+    """The straight line between the ends of a member."""
 
     cosine: float  # the least of an end's turn against the chord
     first: float  # length without loads
@@ -130,7 +130,7 @@ def _deform(
     ratios: np.ndarray,
     deformed: np.ndarray,
     slopes: np.ndarray,
-) -> Shape:
+) -> Chord:
     """Fill the axes of both ends, the deformations with their slopes, and of each angle over its sine the derivatives by the cosine."""
     moved = row(moves, ends[1]), row(moves, ends[0])
     change = moved[0][0] - moved[1][0], moved[0][1] - moved[1][1], moved[0][2] - moved[1][2]
@@ -145,7 +145,7 @@ def _deform(
         _turn(axes, turns[ends[end]], frames[end])
         least = min(least, _bend(frames[end], along, length, series, end, ratios[end], deformed, slopes))
     _twist(frames, deformed, slopes)
-    return Shape(least, first, length, along)
+    return Chord(least, first, length, along)
 
 
 @kernel
