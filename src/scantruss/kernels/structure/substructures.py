@@ -72,7 +72,10 @@ def solve_factored(
     work : (F,), of any values
     """
     for s in range(len(first) - 1):
-        count, wide, own, coupling = _part(first, begin, values, outer_first, s)
+        count, wide = first[s + 1] - first[s], outer_first[s + 1] - outer_first[s]
+        middle = begin[s] + count * count
+        own = values[begin[s] : middle].reshape(count, count)
+        coupling = values[middle : begin[s + 1]].reshape(count, wide)
         places = outer[outer_first[s] : outer_first[s + 1]]
         for c in range(len(loads)):
             mine = loads[c, first[s] : first[s + 1]]
@@ -88,7 +91,10 @@ def solve_factored(
             for k in range(wide):
                 loads[c, places[k]] -= work[k]
     for s in range(len(first) - 2, -1, -1):
-        count, wide, own, coupling = _part(first, begin, values, outer_first, s)
+        count, wide = first[s + 1] - first[s], outer_first[s + 1] - outer_first[s]
+        middle = begin[s] + count * count
+        own = values[begin[s] : middle].reshape(count, count)
+        coupling = values[middle : begin[s + 1]].reshape(count, wide)
         places = outer[outer_first[s] : outer_first[s + 1]]
         for c in range(len(loads)):
             mine = loads[c, first[s] : first[s + 1]]
@@ -97,20 +103,6 @@ def solve_factored(
             for j in range(count - 1, -1, -1):
                 value = signs[first[s] + j] * mine[j] - _dot(coupling[j], work, wide)
                 mine[j] = (value - _dot(own[j, j + 1 :], mine[j + 1 :], count - j - 1)) / own[j, j]
-
-
-@kernel
-def _part(
-    first: np.ndarray, begin: np.ndarray, values: np.ndarray, outer_first: np.ndarray, s: int
-) -> tuple[int, int, np.ndarray, np.ndarray]:
-    count, wide = first[s + 1] - first[s], outer_first[s + 1] - outer_first[s]
-    middle = begin[s] + count * count
-    return (
-        count,
-        wide,
-        values[begin[s] : middle].reshape(count, count),
-        values[middle : begin[s + 1]].reshape(count, wide),
-    )
 
 
 @kernel
