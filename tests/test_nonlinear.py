@@ -4,6 +4,7 @@ import math
 from dataclasses import replace
 from typing import Any
 
+import beams_of_arrays
 import numpy as np
 import pytest
 from numpy.typing import ArrayLike
@@ -275,8 +276,8 @@ def test_tangents_are_the_derivatives_of_forces_and_turn_with_the_structure() ->
 
 
 @pytest.mark.kernels
-def test_forces_alone_are_those_with_derivatives() -> None:
-    """The kernel against its twin of arrays, small turns and large ones, hinges and springs at the ends."""
+def test_forces_and_their_derivatives_are_those_of_arrays() -> None:
+    """The kernels against their twin of arrays, small turns and large ones, hinges and springs at the ends."""
     rng = np.random.default_rng(1)
     nodes = rng.normal(size=(8, 3)) * 3
     springs = np.where(rng.random((12, 2, 2)) < 0.5, np.inf, 3e5)
@@ -286,12 +287,23 @@ def test_forces_alone_are_those_with_derivatives() -> None:
     for size in (0.0, 1e-6, 0.2, 2.0):
         moves = rng.normal(size=(8, 3)) * 0.1 * size
         turns = Rotation.from_rotvec(rng.normal(size=(8, 3)) * 0.3 * size).as_matrix()
-        fast, slow = (each(members, moves, turns, strain, 0.7) for each in (answer, respond))
-        most = np.abs(slow.natural).max()
+        given = members, moves, turns, strain, 0.7
+        foreseen = rng.normal(size=(12, 6)) * 1e3
+        fast, slow = answer(*given), beams_of_arrays.respond(*given)
         assert fast.too_far == slow.too_far == (size > 1) and FARTHEST_TURN == 0.5
-        if not slow.too_far:
-            assert fast.natural == pytest.approx(slow.natural, abs=1e-12 * most)
-            assert fast.forces == pytest.approx(slow.forces, abs=1e-12 * most)
+        if slow.too_far:
+            continue
+        for name in ("natural", "forces"):
+            same(getattr(fast, name), getattr(slow, name))
+        for others in ({}, {"tangents": True}, {"tangents": True, "foreseen": foreseen}):
+            made, twin = respond(*given, **others), beams_of_arrays.respond(*given, **others)
+            assert not made.too_far and (made.tangents is None) == ("tangents" not in others)
+            for name in ("natural", "forces", "strained", "stiffness", "slope", *list(others)[:1]):
+                same(getattr(made, name), getattr(twin, name))
+
+
+def same(found: np.ndarray, expected: np.ndarray) -> None:
+    assert found == pytest.approx(expected, abs=1e-12 * max(float(np.abs(expected).max()), 1e-30))
 
 
 def test_mixed_iterations_solve_what_plain_ones_do_not() -> None:

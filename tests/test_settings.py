@@ -131,7 +131,10 @@ def test_fixed_nodes_are_read_from_any_text(tmp_path: Path, text: str) -> None:
     )
 
 
-@pytest.mark.parametrize("text", ["", "x,y,z\n", "1,2\n", "1,2,3\n4,5\n", "1,2,3\nend\n", "a,b,c\nd,e,f\n1,2,3\n"])
+@pytest.mark.parametrize(
+    "text",
+    ["", "x,y,z\n", "1,2\n", "1,2,3\n4,5\n", "1,2,3\nend\n", "a,b,c\nd,e,f\n1,2,3\n", "1,2,3\nnan,0,0\n", "inf,0,0\n"],
+)
 def test_a_file_without_fixed_nodes_is_refused(tmp_path: Path, text: str) -> None:
     (tmp_path / "fixed.csv").write_text(text)
     with pytest.raises(FormatError, match=r"fixed\.csv"):

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 from scipy.sparse import csc_matrix
-from scipy.sparse.linalg import splu
 from shapes import make
 from small_grids import dome, fan
 from small_trusses import (
@@ -32,11 +31,11 @@ import scantruss as st
 from scantruss.grid.grid import Grid
 from scantruss.structure import modes as modes_module
 from scantruss.structure.lanczos import largest_eigenpairs
-from scantruss.structure.mechanism import pivots
 from scantruss.structure.modes import buckling_modes, vibration_modes, worst_buckling
 from scantruss.structure.ordering import dissected
 from scantruss.structure.report import report_structure
-from scantruss.structure.statics import IN_ORDER, factor_stiffness, solve
+from scantruss.structure.statics import factor_stiffness, solve
+from scantruss.structure.substructures import factor_by_parts
 from scantruss.structure.truss import LoadCase, Truss
 
 FOUR_DIGITS = 5e-5
@@ -417,7 +416,8 @@ def test_lanczos_finds_the_largest_eigenvalues_of_a_dense_twin(count: int) -> No
     basis = np.linalg.qr(rng.standard_normal((40, 40)))[0]
     matrix = basis @ np.diag([9.0, 9.0, *np.linspace(-3, 5, 36), 0.0, 0.0]) @ basis.T
     metric = np.diag(rng.uniform(1, 3, 40))
-    found = largest_eigenpairs(splu(csc_matrix(metric)), csc_matrix(matrix), csc_matrix(metric), count, 1e-10)
+    factor = factor_by_parts(csc_matrix(metric), np.array([0, 40]))
+    found = largest_eigenpairs(factor, csc_matrix(matrix), csc_matrix(metric), count, 1e-10)
     assert found is not None
     values, vectors = found
     expected = eigh(matrix, metric, eigvals_only=True)[::-1][:count]
@@ -428,23 +428,15 @@ def test_lanczos_finds_the_largest_eigenvalues_of_a_dense_twin(count: int) -> No
 @pytest.mark.parametrize("count", [2, 5, 23])
 def test_nodes_are_eliminated_in_an_order_that_fills_in_little(count: int) -> None:
     truss = Truss.from_grid(dome(count, 40.0), scale=50, supports="boundary", loads="self")
-    rank = dissected(truss)
+    rank, first = dissected(truss)
     assert np.array_equal(np.sort(rank), np.arange(len(rank)))
+    assert first[0] == 0 and first[-1] == len(rank) and (np.diff(first) > 0).all()
     joined = np.eye(len(rank)) * 9
     joined[tuple(truss.members.T)] = joined[tuple(truss.members.T[::-1])] = -1.0
     inorder = np.argsort(rank)
-    fill = [splu(csc_matrix(joined[order][:, order]), **IN_ORDER).nnz for order in (np.arange(len(rank)), inorder)]
+    matrices = [csc_matrix(joined[order][:, order]) for order in (np.arange(len(rank)), inorder)]
+    fill = [len(factor_by_parts(matrix, first).values) for matrix in matrices]
     assert fill[1] < 0.8 * fill[0] or count < 6
-
-
-def test_pivots_leave_a_factor_as_it_was_and_no_copy_of_it() -> None:
-    matrix = csc_matrix(np.diag([4.0, -3.0, 2.0, 5.0]) + np.eye(4, k=1) + np.eye(4, k=-1))
-    factor = splu(matrix, **IN_ORDER)
-    found = pivots(factor)
-    assert (found < 0).sum() == (np.linalg.eigvalsh(matrix.toarray()) < 0).sum() == 1
-    assert found.prod() == pytest.approx(np.linalg.det(matrix.toarray()))
-    assert factor.U.nnz == factor.L.nnz == 0
-    assert matrix @ factor.solve(np.ones(4)) == pytest.approx(np.ones(4))
 
 
 def test_a_large_structure_that_is_only_pulled_does_not_buckle() -> None:

@@ -210,6 +210,15 @@ def test_supports_of_a_file_are_the_nearest_nodes(place: Path) -> None:
     assert np.flatnonzero(held).tolist() == [0, 6, 42, 48]
 
 
+def test_a_position_that_is_no_number_supports_nothing(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Nothing is nearest to it, so no node is taken for it."""
+    x, y, z = st.read_grid("grid.json").scan_nodes[0]
+    Path("feet.csv").write_text(f"{x},{y},{z}\nnan,{y},{z}\n")
+    assert run("structure grid.json out.json --supports feet.csv") == 2
+    assert "feet.csv, line 2: needs three finite numbers X,Y,Z" in capsys.readouterr().err
+    assert not Path("out.json").exists()
+
+
 def test_a_unit_can_be_given_where_the_grid_has_none(place: Path) -> None:
     assert run("structure nounit.json out.json --scale 50 --unit mm") == 0
     assert st.read_structure("out.json").lengths.mean() == pytest.approx(2.0, rel=0.05)
@@ -308,6 +317,11 @@ def test_what_cannot_be_used_is_one_line(
         ("scale =", "is not TOML"),
         ("[[combinations]]\nname = 'a'", "a combination that cannot be used: no factors"),
         ("[[combinations]]\nname = 'a'\nfactors = { none = 1.0 }", "names no load case 'none'"),
+        (
+            "[[combinations]]\nname = 'a'\nfactors = { self = nan }",
+            "factors must be one finite number or more, got {'self': nan}",
+        ),
+        ("[[combinations]]\nname = 'a'\nfactors = {}", "factors must be one finite number or more, got {}"),
         ("[[loads]]\nforce = [0, 0]\nnodes = 'N001'", "needs three numbers"),
         ("[[loads]]\nforce = [0, 0, 1]", "needs nodes"),
         ("[[loads]]\nforce = [0, 0, 1]\nnodes = ['N900']", "the load 'point' names nodes that are not there: 'N900'"),

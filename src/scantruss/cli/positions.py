@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import re
 from pathlib import Path
 
@@ -119,6 +120,8 @@ def _read_parts(path: str | Path, what: str) -> list[NamedPart]:
             columns = [names.index(axis) for axis in "xyz"] if {"x", "y", "z"} <= set(names) else columns
             named = names.index("name") if {"name", "x", "y", "z"} <= set(names) else named
             continue
+        if not all(map(math.isfinite, (x, y, z))):
+            raise FormatError(f"{path}, line {count}: needs three finite numbers X,Y,Z, got {line.strip()!r}")
         name = words[named] if 0 <= named < len(words) else ""
         if begins or name != found[-1][0]:
             found.append((name, []))

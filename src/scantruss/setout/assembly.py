@@ -8,16 +8,16 @@ stands without any.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.sparse import diags, identity
-from scipy.sparse.linalg import splu
+from scipy.sparse import identity
 
 from ..runtime.progress import Progress
-from ..structure.frame import freedoms, stiffness_matrix
+from ..structure.frame import freedoms
 from ..structure.mechanism import softest_motion
-from ..structure.statics import ORDERING, SINGULAR, Factored, solve
+from ..structure.statics import SINGULAR, Factored, scaled_stiffness, solve
+from ..structure.substructures import factor_by_parts
 from ..structure.truss import LoadCase, Truss
 
 SHIFT = 1e-13  # of the scaled stiffness, so that a pivot that is nil does not end the elimination
@@ -132,24 +132,18 @@ def _near(nodes: np.ndarray, node: int, propped: np.ndarray, reach: float) -> bo
 
 def _examine(part: Truss) -> Factored | tuple[np.ndarray, np.ndarray]:
     """Return the factored stiffness of a part, or which nodes to hold against moving and against turning without resistance."""
-    width = freedoms(part)
-    free = np.flatnonzero(~np.isinf(part.supports[:, :width]).ravel())
-    stiffness = stiffness_matrix(part)
-    if len(free) == 0:
-        return Factored(part, stiffness, free, np.ones(0), None)
-    inner = stiffness[free][:, free]
-    diagonal = inner.diagonal()
-    root = np.sqrt(np.where(diagonal > 1e-14 * diagonal.max(), diagonal, diagonal.max()))
-    scaled = (diags(1.0 / root) @ inner @ diags(1.0 / root)).tocsc()
-    factor = splu((scaled + SHIFT * identity(len(free))).tocsc(), **ORDERING)
-    nil = free[np.abs(factor.U.diagonal())[factor.perm_c] < LOOSE]
+    made, width = scaled_stiffness(part), freedoms(part)
+    if len(made.free) == 0:
+        return made
+    factor = factor_by_parts((made.scaled + SHIFT * identity(len(made.free))).tocsc(), made.first)
+    nil = made.free[np.abs(factor.pivots) < LOOSE]
     if (nil % width < 3).any():
         return np.unique(nil[nil % width < 3] // width), NONE
-    value, motion = softest_motion(scaled, factor)
+    value, motion = softest_motion(made.scaled, factor)
     if value >= 10 * SINGULAR and len(nil) == 0:
-        return Factored(part, stiffness, free, root, factor)
+        return replace(made, factor=factor)
     everywhere = np.zeros((len(part.nodes), width))
-    everywhere.ravel()[free] = motion / root
+    everywhere.ravel()[made.free] = motion / made.root
     moves, turns = (np.linalg.norm(everywhere[:, k : k + 3], axis=1) for k in (0, 3))
     if moves.max() > 1e-6 * float(turns.max()) * float(part.lengths.max()):
         return np.array([moves.argmax()]), NONE

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
-from scipy.sparse import csc_matrix, identity
-from scipy.sparse.linalg import SuperLU, splu
+from scipy.sparse import csc_matrix
 from scipy.spatial.transform import Rotation
 
 from .corotational import Answer, Members, Response, answer, respond
 from .frame import freedoms, member_freedoms
-from .mechanism import pivots, softest_motion
-from .statics import IN_ORDER, SINGULAR, Factored, dead_loads
+from .mechanism import softest_motion
+from .statics import SINGULAR, Factored, dead_loads
+from .substructures import Factor, SingularError, Substructures
 from .truss import LoadCase
 
 
@@ -37,24 +36,24 @@ class Tangent:
     """The factored tangent of a state."""
 
     matrix: csc_matrix  #: of the free displacements, scaled
-    lu: SuperLU
+    factor: Factor
     root: np.ndarray  #: (F,) by which displacements are scaled
 
-    @cached_property
+    @property
     def negative(self) -> int:
         """Negative pivots: as many as ways in which the state is not stable."""
-        return int((pivots(self.lu) < 0).sum())
+        return self.factor.negative
 
     def solve(self, loads: np.ndarray) -> np.ndarray:
         """Return the (F,) or (F, C) displacements of loads."""
         root = self.root if loads.ndim == 1 else self.root[:, None]
-        found: np.ndarray = self.lu.solve(loads / root) / root
+        found: np.ndarray = self.factor.solve(loads / root) / root
         return found
 
     @property
     def smallest(self) -> float:
         """The eigenvalue nearest to nil, below it where the state is not stable."""
-        value = abs(softest_motion(self.matrix, self.lu)[0])
+        value = abs(softest_motion(self.matrix, self.factor)[0])
         return -value if self.negative else value
 
 
@@ -96,6 +95,7 @@ class Equilibrium:
         column, self._row = np.divmod(found, count)
         self._first = np.searchsorted(column, np.arange(count + 1))
         self._scale = 1 / (self.root[self._row] * self.root[column])
+        self._parts = Substructures.of(self._matrix(self._scale), factored.first)
 
     def start(self) -> LoadedState:
         """Return the state without loads."""
@@ -153,14 +153,18 @@ class Equilibrium:
         assert response.tangents is not None
         values = np.bincount(self._place.ravel(), response.tangents.ravel(), len(self._row) + 1)[:-1]
         values[self._diagonal] += self.springs[:, : self.width].ravel()[self.free]
-        matrix = csc_matrix((values * self._scale, self._row, self._first), shape=(len(self.free),) * 2)
+        matrix = self._matrix(values * self._scale)
         try:
-            lu = splu(matrix, **IN_ORDER)
-            if (lu.perm_r != lu.perm_c).any():
-                raise RuntimeError("a pivot is off the diagonal")
-        except RuntimeError:  # singular, or nearly so: take the next matrix
-            lu = splu((matrix + SINGULAR / 10 * identity(len(self.free))).tocsc(), **IN_ORDER)
-        return Tangent(matrix, lu, self.root)
+            factor = self._parts.factor(matrix)
+        except SingularError:  # take the next matrix
+            shifted = matrix.data.copy()
+            shifted[self._diagonal] += SINGULAR / 10
+            factor = self._parts.factor(self._matrix(shifted))
+        return Tangent(matrix, factor, self.root)
+
+    def _matrix(self, values: np.ndarray) -> csc_matrix:
+        """Return the matrix of the free displacements with these values."""
+        return csc_matrix((values, self._row, self._first), shape=(len(self.free),) * 2)
 
     def direction(self, response: Response) -> np.ndarray:
         """Return the (F,) forces by which the load factor moves the state: loads, strain and settlement, for 1."""

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.sparse import csc_matrix
-from scipy.sparse.linalg import SuperLU
+
+from .substructures import Factor
 
 BASIS_SIZE = 160  #: of the basis
 NIL_NORM = 1e-10  #: of what is left of a vector, over what it was, where it lies within the basis
@@ -54,13 +55,13 @@ class Basis:
 
 
 def largest_eigenpairs(
-    factor: SuperLU, matrix: csc_matrix, metric: csc_matrix, count: int, tolerance: float, block: int = 2
+    factor: Factor, matrix: csc_matrix, metric: csc_matrix, count: int, tolerance: float, block: int = 2
 ) -> tuple[np.ndarray, np.ndarray] | None:
     """Return the `count` largest eigenvalues of L^-1 A (K,), largest first, with their vectors (F, K).
 
     Parameters
     ----------
-    factor : SuperLU
+    factor : Factor
         Of the (F, F) matrix L.
     matrix : (F, F) sparse matrix
         A.

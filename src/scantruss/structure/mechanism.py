@@ -7,24 +7,24 @@ from typing import NoReturn
 
 import numpy as np
 from scipy.sparse import csc_matrix
-from scipy.sparse.linalg import SuperLU
 
 from ..errors import InputError
 from ..kernels.geometry.components import component_labels
+from .substructures import Factor
 from .truss import Truss
 
 MOST_NAMED = 4  #: nodes of a mechanism that are named
 INVERSE_STEPS = 6  #: of inverse iteration, which converges in two where an eigenvalue is nil
 
 
-def softest_motion(stiffness: csc_matrix, factor: SuperLU, stiff: float = math.inf) -> tuple[float, np.ndarray]:
+def softest_motion(stiffness: csc_matrix, factor: Factor, stiff: float = math.inf) -> tuple[float, np.ndarray]:
     """Return the smallest eigenvalue of a stiffness matrix, or one little above it, with its motion: inverse iteration.
 
     Parameters
     ----------
     stiffness : (F, F) sparse matrix
         Symmetric, not negative, diagonal 1.
-    factor : SuperLU
+    factor : Factor
         Of that matrix, or of one shifted a little.
     stiff : float
         Eigenvalue that matters no more: once all are seen to be larger the value is only some larger one.
@@ -41,19 +41,6 @@ def softest_motion(stiffness: csc_matrix, factor: SuperLU, stiff: float = math.i
         motion = found
     motion /= math.sqrt(product(motion, motion))
     return product(motion, stiffness @ motion), motion
-
-
-def pivots(factor: SuperLU) -> np.ndarray:
-    """Return the pivots of a factored matrix (F,); to be asked once of each.
-
-    They stand in copies of both factors which SuperLU makes when it is asked and keeps as long as it lives, as large as itself: so the
-    copies are emptied.
-    """
-    found: np.ndarray = factor.U.diagonal()
-    for copy in (factor.L, factor.U):
-        copy.data, copy.indices = copy.data[:0].copy(), copy.indices[:0].copy()
-        copy.indptr = np.zeros_like(copy.indptr)
-    return found
 
 
 def product(one: np.ndarray, other: np.ndarray) -> float:

@@ -12,13 +12,14 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import eigh
 from scipy.sparse import csc_matrix, diags
-from scipy.sparse.linalg import LinearOperator, SuperLU, eigsh, splu
+from scipy.sparse.linalg import LinearOperator, eigsh
 
 from ..errors import InputError
 from .frame import BEND_Y1, BEND_Z1, BOW, LENGTHEN, assemble, freedoms, inner_turns, member_freedoms, transforms
 from .lanczos import largest_eigenpairs
-from .mechanism import pivots, product
-from .statics import IN_ORDER, CaseResult, Factored, Solution
+from .mechanism import product
+from .statics import CaseResult, Factored, Solution
+from .substructures import Factor, SingularError, factor_by_parts
 from .truss import GRAVITY, Truss
 
 FEW_FREEDOMS = 200  #: up to which all modes are found at once by dense matrices
@@ -128,8 +129,10 @@ def _geometric(truss: Truss, axial: np.ndarray) -> np.ndarray:
     return made
 
 
-def _of_many(part: csc_matrix, stiff: csc_matrix, factor: SuperLU, count: int) -> tuple[np.ndarray, np.ndarray]:
+def _of_many(part: csc_matrix, stiff: csc_matrix, factored: Factored, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Return `count` largest eigenvalues of `part` x = mu `stiff` x (K,) with their vectors (F, K), or one that is not positive."""
+    factor = factored.factor
+    assert factor is not None
     first, vectors = _of_factor(part, stiff, factor, 1, ROUGH)
     usual = np.random.default_rng(1).standard_normal(stiff.shape[0])
     made = factor.solve(part @ usual)
@@ -137,11 +140,12 @@ def _of_many(part: csc_matrix, stiff: csc_matrix, factor: SuperLU, count: int) -
         return first, vectors
     for share in MODE_SHIFTS:
         shift = share / float(first[0])
+        matrix = (stiff - shift * part).tocsc()
         try:
-            moved = splu((stiff - shift * part).tocsc(), **IN_ORDER)
-        except RuntimeError:  # an eigenvalue lies there
+            moved = factor_by_parts(matrix, factored.first)
+        except SingularError:  # an eigenvalue lies there
             continue
-        if (moved.perm_r == moved.perm_c).all() and (pivots(moved) > 0).all():  # none lies before
+        if moved.negative == 0:  # none lies before
             near = largest_eigenpairs(moved, stiff, stiff, count, EXACT)
             if near is not None:
                 return (near[0] - 1) / (shift * near[0]), near[1]  # near: factors over what they are beyond the shift
@@ -149,7 +153,7 @@ def _of_many(part: csc_matrix, stiff: csc_matrix, factor: SuperLU, count: int) -
 
 
 def _of_factor(
-    part: csc_matrix, stiff: csc_matrix, factor: SuperLU, count: int, tolerance: float
+    part: csc_matrix, stiff: csc_matrix, factor: Factor, count: int, tolerance: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return `count` largest eigenpairs of the factored matrix alone, by ARPACK where they lie too close together."""
     found = largest_eigenpairs(factor, part, stiff, count, tolerance, block=min(count, 2))
@@ -170,11 +174,11 @@ def _largest(factored: Factored, matrix: csc_matrix, count: int) -> tuple[np.nda
     part = (scale @ matrix[free][:, free] @ scale).tocsc()
     if factored.factor is None or not np.any(part.data):
         return np.zeros(0), np.zeros((0, nodes, 3))
-    stiff = (scale @ factored.stiffness[free][:, free] @ scale).tocsc()
+    stiff = factored.scaled
     if len(free) <= max(FEW_FREEDOMS, 3 * count):
         values, vectors = eigh(part.toarray(), stiff.toarray())
     else:
-        values, vectors = _of_many(part, stiff, factored.factor, count)
+        values, vectors = _of_many(part, stiff, factored, count)
     order = [k for k in np.argsort(-values)[:count] if values[k] > NEGLIGIBLE * np.abs(values).max()]
     shapes = np.zeros((len(order), nodes, 3))
     for number, k in enumerate(order):

@@ -186,6 +186,8 @@ def _combination_of(path: str | Path, each: Any) -> Combination:
         state = str(each.get("state", "ULS"))
         if state not in ("ULS", "SLS"):
             raise ValueError(f"state must be ULS or SLS, got {state!r}")
+        if not factors or not all(math.isfinite(factor) for _, factor in factors):
+            raise ValueError(f"factors must be one finite number or more, got {each['factors']}")
         return Combination(str(each["name"]), state, factors)
     except (KeyError, TypeError, ValueError, AttributeError) as error:
         words = f"no {error.args[0]}" if isinstance(error, KeyError) else error

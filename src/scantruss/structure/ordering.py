@@ -6,21 +6,23 @@ import numpy as np
 
 from .truss import Truss
 
-LEAST_PART = 4  #: nodes that are not divided further
+LEAST_PART = 16  #: nodes that are not divided further: dense matrices of theirs are fast
 
 
-def dissected(truss: Truss) -> np.ndarray:
+def dissected(truss: Truss) -> tuple[np.ndarray, np.ndarray]:
     """Return the rank (V,) of each node: two parts along the longest side first, then the nodes between them, and so on in each part.
 
-    All parts of one depth are divided at once.
+    All parts of one depth are divided at once. Second come the first rank of each part that is not divided and of the nodes between
+    each two, rising, and last the number of nodes.
     """
     count = len(truss.nodes)
     rank = np.empty(count, np.int64)
     part = np.zeros(count, np.int64)  # of each node that has no rank yet
     end = np.array([count])  # the rank after the last one of each part
     left = np.arange(count)  # nodes without a rank
+    firsts = [end]
     members = truss.members
-    while len(left):  # ends: a part of four nodes at most gives them ranks, any other is divided into smaller ones
+    while len(left):  # ends: a part of few nodes gives them ranks, any other is divided into smaller ones
         order, first, size = _along_longest_sides(truss.nodes[left], part[left], len(end))
         left = left[order]
         mine = part[left]
@@ -35,6 +37,7 @@ def dissected(truss: Truss) -> np.ndarray:
         whole = (size <= LEAST_PART) | (last == size - size // 2)
         done = whole[mine] | between[left]
         sizes = np.where(whole, size, last)
+        firsts.append((end - sizes)[sizes > 0])
         rank[left[done]] = (end - sizes)[mine[done]] + _numbers_within(mine[done])
         inside = np.zeros(count, bool)
         inside[left[~done]] = True
@@ -44,7 +47,7 @@ def dissected(truss: Truss) -> np.ndarray:
         ends = np.stack([end - last - (size // 2), end - last], axis=1).ravel()
         kept, part[left] = np.unique(fresh, return_inverse=True)
         end = ends[kept]
-    return rank
+    return rank, np.unique(np.concatenate(firsts))
 
 
 def _along_longest_sides(places: np.ndarray, part: np.ndarray, parts: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -10,7 +10,7 @@ from .nonlinear import CUTS, PATH_STEPS
 from .path import Path
 from .truss import Truss
 
-SECONDS = 3e-5  #: of a step for each displacement of a node, on a usual machine
+SECONDS = 1.5e-5  #: of a step for each displacement of a node, on a usual machine
 GROWS = 1.2  #: power of the displacements by which this grows
 EXTRA_STEPS = 10  #: that a path needs to find where stability is lost
 

@@ -8,7 +8,6 @@ from functools import cached_property
 
 import numpy as np
 from scipy.sparse import csc_matrix, diags, identity
-from scipy.sparse.linalg import SuperLU, splu
 
 from ..errors import InputError
 from .frame import (
@@ -24,6 +23,7 @@ from .frame import (
 )
 from .mechanism import product, refuse_mechanism, softest_motion
 from .ordering import dissected
+from .substructures import Factor, SingularError, factor_by_parts
 from .truss import GRAVITY, LoadCase, Truss
 
 SINGULAR = 1e-12  #: smallest eigenvalue of the stiffness, its diagonal scaled to 1, at which a structure is a mechanism
@@ -32,8 +32,6 @@ STIFF = 1e-8  #: smallest eigenvalue that is no mechanism, whatever it is exactl
 REFINED = 1e-11  #: share of the greatest load that a solution may leave
 UNSOLVED = 1e-3  #: share of a load that a factor leaves where it is none
 STATIONS = 9  #: places along a member, both ends included, at which forces are given
-ORDERING = {"permc_spec": "MMD_AT_PLUS_A", "diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
-IN_ORDER = {**ORDERING, "permc_spec": "NATURAL"}  #: of displacements that are in a good order already
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,25 +185,38 @@ class Factored:
 
     truss: Truss
     stiffness: csc_matrix  #: of all displacements, supports not yet held
-    free: np.ndarray  #: (F,) numbers of the displacements that are free
+    free: np.ndarray  #: (F,) numbers of the displacements that are free, as they are eliminated
+    first: np.ndarray  #: (S + 1,) first of each substructure among these
     root: np.ndarray  #: (F,) square roots of the diagonal, by which it is scaled
-    factor: SuperLU | None  #: of the scaled stiffness of the free displacements; None where all is held
+    scaled: csc_matrix  #: stiffness of the free displacements, its diagonal 1
+    factor: Factor | None  #: of that; None where all is held, or it is not factored yet
 
     def solve(self, loads: np.ndarray) -> np.ndarray:
         """Return the (F, C) free displacements of loads, refined once where they leave more than `REFINED` of the greatest load."""
         if self.factor is None:
             return loads
-        part = self.stiffness[self.free][:, self.free]
-        found = self._once(loads)
-        left = loads - part @ found
+        root = self.root[:, None]
+        found = self.factor.solve(loads / root)
+        left = loads - root * (self.scaled @ found)
         rough = np.abs(left).max(axis=0) > REFINED * np.abs(loads).max(axis=0)
         if rough.any():
-            found[:, rough] += self._once(left[:, rough])
-        return found
+            found[:, rough] += self.factor.solve(left[:, rough] / root)
+        return found / root
 
-    def _once(self, loads: np.ndarray) -> np.ndarray:
-        assert self.factor is not None
-        return self.factor.solve(np.ascontiguousarray(loads / self.root[:, None])) / self.root[:, None]
+
+def scaled_stiffness(truss: Truss) -> Factored:
+    """Return the stiffness of a structure, scaled and ready to be factored."""
+    stiffness, width = stiffness_matrix(truss), freedoms(truss)
+    free = np.flatnonzero(~np.isinf(truss.supports[:, :width]).ravel())
+    rank, first = dissected(truss)
+    rank = rank[free // width]
+    order = np.argsort(rank, kind="stable")
+    free, first = free[order], np.unique(np.searchsorted(rank[order], first))
+    part = stiffness[free][:, free]
+    diagonal = part.diagonal()
+    root = np.sqrt(np.where(diagonal > 1e-14 * diagonal.max(initial=0.0), diagonal, diagonal.max(initial=0.0)))
+    scale = diags(1.0 / root)
+    return Factored(truss, stiffness, free, first, root, (scale @ part @ scale).tocsc(), None)
 
 
 def factor_stiffness(truss: Truss) -> Factored:
@@ -217,36 +228,26 @@ def factor_stiffness(truss: Truss) -> Factored:
         There is no support, or the structure is a mechanism; the message names its nodes and their motion.
     """
     check_whole(truss)
-    stiffness = stiffness_matrix(truss)
-    held = np.isinf(truss.supports[:, : freedoms(truss)]).ravel()
-    free = np.flatnonzero(~held)
-    free = free[np.argsort(dissected(truss)[free // freedoms(truss)], kind="stable")]
-    if len(free) == 0:
-        return Factored(truss, stiffness, free, np.ones(0), None)
-    part = stiffness[free][:, free]
-    diagonal = part.diagonal()
-    root = np.sqrt(np.where(diagonal > 1e-14 * diagonal.max(), diagonal, diagonal.max()))
-    scale = diags(1.0 / root)
-    scaled = (scale @ part @ scale).tocsc()
-    factor = _factor_of(scaled)
-    value, motion = (0.0, root) if factor is None else softest_motion(scaled, factor, STIFF)
-    if small := value < NEARLY_SINGULAR:  # the factor of a matrix that is nearly singular is not to be trusted
-        factor = splu((scaled + SINGULAR / 10 * identity(len(free))).tocsc(), **IN_ORDER)
-        value, motion = softest_motion(scaled, factor)
-    if value < SINGULAR:
-        everywhere = np.zeros(stiffness.shape[0])
-        everywhere[free] = motion / root
+    made = scaled_stiffness(truss)
+    if len(made.free) == 0:
+        return made
+    factor = _factor_of(made.scaled, made.first)
+    value, motion = (0.0, made.root) if factor is None else softest_motion(made.scaled, factor, STIFF)
+    if value < NEARLY_SINGULAR:  # the factor of a matrix that is nearly singular is not to be trusted
+        shifted = (made.scaled + SINGULAR / 10 * identity(len(made.free))).tocsc()
+        value, motion = softest_motion(made.scaled, factor_by_parts(shifted, made.first))
+    if factor is None or value < SINGULAR:
+        everywhere = np.zeros(made.stiffness.shape[0])
+        everywhere[made.free] = motion / made.root
         refuse_mechanism(truss, everywhere.reshape(len(truss.nodes), -1))
-    if small:
-        factor = splu(scaled, permc_spec="COLAMD")
-    return Factored(truss, stiffness, free, root, factor)
+    return replace(made, factor=factor)
 
 
-def _factor_of(matrix: csc_matrix) -> SuperLU | None:
+def _factor_of(matrix: csc_matrix, first: np.ndarray) -> Factor | None:
     """Return the factor of a matrix; None where a pivot is nil, or where it does not solve."""
     try:
-        factor = splu(matrix, **IN_ORDER)
-    except RuntimeError:
+        factor = factor_by_parts(matrix, first)
+    except SingularError:
         return None
     loads = np.random.default_rng(2).standard_normal(matrix.shape[0])
     left = matrix @ factor.solve(loads) - loads
