@@ -109,6 +109,7 @@ def test_a_refused_length_comes_with_one_that_passes(
         return checked(grid, samples, boundary, settings)
 
     monkeypatch.setattr("scantruss.candidates.checked", fails_there)
+    monkeypatch.setattr("scantruss.attempts.MOST_RUNS", 3)  # there is no use in more where all fail
     words = ["grid", "limpet.xyz", "a.json", "--effort", "quick", "--length"]
     assert main([*words, str(failing)]) == 2
     said = capsys.readouterr().err
