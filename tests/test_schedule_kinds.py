@@ -17,6 +17,7 @@ from scantruss.export.json import encode_json
 from scantruss.export.model import model_of_grid
 from scantruss.export.page_tables import tables_of
 from scantruss.layouts.alike import PartKinds
+from scantruss.structure.json import encode_structure
 
 
 def shaken_honeycomb() -> st.Grid:
@@ -129,3 +130,25 @@ def test_what_is_alike_holds_for_the_nodes_of_before(tmp_path: Path) -> None:
         (tmp_path / "a.json").write_text(json.dumps(values | {"alike": values["alike"] | wrong}))
         with pytest.raises(st.FormatError, match="damaged grid"):
             st.read_grid(tmp_path / "a.json")
+
+
+@pytest.mark.parametrize(
+    ("few", "enough", "table"),
+    [(st.few_panels, 3, "panel_types"), (st.few_joints, AS_THEY_ARE, "node_types"), (None, 0, "lengths")],
+)
+def test_a_structure_keeps_what_was_made_alike(few: Any, enough: int, table: str, tmp_path: Path) -> None:
+    """Its schedules have the types of those of its grid, at any scale, and after it was saved."""
+    grid = st.few_lengths(uneven(4), 0.01, 3).grid if few is None else few(uneven(4), 0.02, enough).grid
+    unit = "" if grid.unit else "m"
+    truss = st.Truss.from_grid(grid, scale=3.0, unit=unit, supports="boundary", loads="self")
+    (tmp_path / "roof.json").write_bytes(encode_structure(truss))
+    again = st.read_structure(tmp_path / "roof.json")
+    ours = st.schedule(again, st.ScheduleSettings())
+    theirs = st.schedule(grid, replace(TUBE, unit=unit, scale=3.0), keep_failed=True)
+    if few is None:
+        assert ours.members["family"] == theirs.members["family"] and len(set(ours.members["family"])) == 3
+    else:
+        counts = getattr(ours, table)["count"]
+        assert counts == getattr(theirs, table)["count"] and len(counts) > 1
+    deep = st.Truss.from_grid(grid, unit=unit, supports="boundary", loads="self", double_layer=0.3)
+    assert deep.alike is None

@@ -147,7 +147,7 @@ def make_schedule(values: Namespace) -> None:
         for number, out in enumerate(outs):
             bars("write", number / len(outs))
             files[out] = len(write_schedules(made, save.beside(out)))
-    print_lines([*schedule_lines(made, settings, getattr(what, "alike", None)), wrote_line(files)])
+    print_lines([*schedule_lines(made, settings, what.alike), wrote_line(files)])
 
 
 def schedule_lines(made: Schedules, settings: ScheduleSettings, alike: Alike | None = None) -> list[str]:

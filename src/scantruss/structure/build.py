@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -88,6 +89,7 @@ def truss_of_grid(
         node_marks=tuple(node_marks(grid)),
         member_marks=tuple(marks),
         scale=float(scale),
+        alike=None if grid.alike is None else replace(grid.alike, member=grid.alike.member * metres),
     )
     held = support_nodes(truss, supports)
     if layered:
@@ -120,6 +122,7 @@ def _with_layers(truss: Truss, layers: DoubleLayer) -> Truss:
         end_stiffness=np.full((members, 2, 2), spring),
         member_sets=layers.groups,
         layers=layers.layers,
+        alike=None,
         node_marks=tuple(numbered("N", count, 3)),
         member_marks=tuple(numbered("M", members, 4)),
     )

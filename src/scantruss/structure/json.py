@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import FormatError
+from ..grid.alike import Alike
 from ..grid.panels import loops_of, table_of
 from ..layouts.double_layer import Layers
 from ..runtime.ours import MARK
@@ -53,6 +54,7 @@ def encode_structure(truss: Truss, solution: Solution | None = None, report: Str
         **({} if truss.panels is None else {"panels": loops_of(truss.panels)}),
         **({"member_sets": truss.member_sets} if truss.member_sets else {}),
         **({"layers": vars(truss.layers)} if truss.layers else {}),
+        **({} if truss.alike is None else {"alike": truss.alike.to_dict()}),
         **{name: getattr(truss, name) for name in _ARRAYS},
         "end_stiffness": truss.end_stiffness.reshape(-1, 4),
         "cases": [vars(case) for case in truss.cases],
@@ -223,6 +225,7 @@ def _truss_of(values: dict[str, Any]) -> Truss:
         member_marks=marks[1],
         scale=float(values["scale"]),
         layers=_layers(values["layers"], count) if values.get("layers") else None,
+        alike=Alike(**values["alike"]) if values.get("alike") else None,
     )
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ..errors import InputError
@@ -40,6 +42,7 @@ def grid_of_triangles(truss: Truss, scale: float = 1.0) -> Grid:
         fixed=np.zeros(len(truss.nodes), bool),
         origin=truss.origin / scale,
         unit="m",
+        alike=None if truss.alike is None else replace(truss.alike, member=truss.alike.member / scale),
     )
 
 

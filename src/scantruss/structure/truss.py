@@ -15,6 +15,7 @@ from ..layouts.layer_parts import SECOND_LAYERS
 from .catalogue import Material, Section
 
 if TYPE_CHECKING:
+    from ..grid.alike import Alike
     from ..grid.grid import Grid
 
 GRAVITY = 9.80665  #: standard acceleration of free fall, ISO 80000-3 [m/s2]
@@ -71,6 +72,7 @@ class Truss:
     member_marks: tuple[str, ...] = ()
     scale: float = 1.0  #: of the structure to the grid
     layers: Layers | None = None  #: of a double layer or more
+    alike: Alike | None = None  #: which parts of the grid were made alike, its mean member in metres
 
     def __repr__(self) -> str:
         """Say what it is made of."""
