@@ -23,6 +23,7 @@ from test_convert import UTM
 import scantruss as st
 from scantruss.cli.main import main
 from scantruss.export.drawing_in import Drawing, grid_of_drawing
+from scantruss.export.drawing_panels import without_diagonals
 from scantruss.export.formats import FORMATS, read_model
 from scantruss.export.ifc_in import draw_ifc
 from scantruss.export.style import FileStyle
@@ -388,3 +389,9 @@ def test_commands_take_quads_of_others(tmp_path: Path, monkeypatch: pytest.Monke
     assert main("structure a.dxf b.json b.ifc b.saf.xlsx b.xlsx b.geojson --supports boundary".split()) == 0
     assert main("schedule a.dxf c.xlsx --tube 60x3".split()) == 0
     assert main("print a.dxf d.3mf --scale 1:50 --member-diameter 0.002 --node-diameter 0.004".split()) == 0
+
+
+def test_a_closed_body_of_which_one_side_alone_is_drawn_keeps_its_faces() -> None:
+    """Joined, they would have that side twice and no other, which is no outline."""
+    faces = np.array([[0, 1, 2], [1, 0, 3], [0, 2, 3], [2, 1, 3]])
+    assert np.array_equal(without_diagonals(faces, np.array([[0, 1]])), faces)

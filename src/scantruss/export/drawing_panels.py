@@ -82,10 +82,10 @@ def without_diagonals(faces: np.ndarray, lines: np.ndarray) -> np.ndarray:
 
 def _loop_of(sides: list[list[int]]) -> list[int] | None:
     """Return the nodes of sides in turn, where these are one loop that meets itself nowhere."""
-    after: dict[int, list[int]] = {}
+    after: dict[int, set[int]] = {}
     for one, other in sides:
-        after.setdefault(one, []).append(other)
-        after.setdefault(other, []).append(one)
+        after.setdefault(one, set()).add(other)
+        after.setdefault(other, set()).add(one)
     if any(len(others) != 2 for others in after.values()):
         return None
     loop = list(sides[0])
