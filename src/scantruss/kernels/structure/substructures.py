@@ -71,7 +71,9 @@ def solve_factored(
     outer_first : (S + 1,), outer : the displacements of the interface of each substructure
     work : (F,), of any values
     """
-    for s in range(len(first) - 1):
+    parts = len(first) - 1
+    for turn in range(2 * parts):  # from the first part to the last, and back
+        s = turn if turn < parts else 2 * parts - 1 - turn
         count, wide = first[s + 1] - first[s], outer_first[s + 1] - outer_first[s]
         middle = begin[s] + count * count
         own = values[begin[s] : middle].reshape(count, count)
@@ -79,30 +81,40 @@ def solve_factored(
         places = outer[outer_first[s] : outer_first[s + 1]]
         for c in range(len(loads)):
             mine = loads[c, first[s] : first[s + 1]]
-            for k in range(wide):
-                work[k] = 0.0
-            for j in range(count):
-                value = mine[j] / own[j, j]
-                mine[j] = value
-                for i in range(j + 1, count):
-                    mine[i] -= own[j, i] * value
+            if turn < parts:
+                _eliminate(own, coupling, mine, work)
                 for k in range(wide):
-                    work[k] += coupling[j, k] * value
-            for k in range(wide):
-                loads[c, places[k]] -= work[k]
-    for s in range(len(first) - 2, -1, -1):
-        count, wide = first[s + 1] - first[s], outer_first[s + 1] - outer_first[s]
-        middle = begin[s] + count * count
-        own = values[begin[s] : middle].reshape(count, count)
-        coupling = values[middle : begin[s + 1]].reshape(count, wide)
-        places = outer[outer_first[s] : outer_first[s + 1]]
-        for c in range(len(loads)):
-            mine = loads[c, first[s] : first[s + 1]]
-            for k in range(wide):
-                work[k] = loads[c, places[k]]
-            for j in range(count - 1, -1, -1):
-                value = signs[first[s] + j] * mine[j] - _dot(coupling[j], work, wide)
-                mine[j] = (value - _dot(own[j, j + 1 :], mine[j + 1 :], count - j - 1)) / own[j, j]
+                    loads[c, places[k]] -= work[k]
+            else:
+                for k in range(wide):
+                    work[k] = loads[c, places[k]]
+                _substitute_back(own, coupling, signs[first[s] : first[s + 1]], mine, work)
+
+
+@kernel
+def _eliminate(own: np.ndarray, coupling: np.ndarray, mine: np.ndarray, carried: np.ndarray) -> None:
+    """Solve for the loads of a substructure (N,), and put what they carry over to its interface into `carried` (B or more,)."""
+    count, wide = coupling.shape
+    for k in range(wide):
+        carried[k] = 0.0
+    for j in range(count):
+        value = mine[j] / own[j, j]
+        mine[j] = value
+        for i in range(j + 1, count):
+            mine[i] -= own[j, i] * value
+        for k in range(wide):
+            carried[k] += coupling[j, k] * value
+
+
+@kernel
+def _substitute_back(
+    own: np.ndarray, coupling: np.ndarray, signs: np.ndarray, mine: np.ndarray, interface: np.ndarray
+) -> None:
+    """Replace the loads of a substructure (N,) by its displacements, with those of its interface (B or more,)."""
+    count, wide = coupling.shape
+    for j in range(count - 1, -1, -1):
+        value = signs[j] * mine[j] - _dot(coupling[j], interface, wide)
+        mine[j] = (value - _dot(own[j, j + 1 :], mine[j + 1 :], count - j - 1)) / own[j, j]
 
 
 @kernel
