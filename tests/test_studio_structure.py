@@ -4,10 +4,10 @@ import io
 import json
 from pathlib import Path
 
-import numpy as np
 import openpyxl
 import pytest
 import trimesh
+from studio_dome import done, session_of_dome
 
 import scantruss as st
 from scantruss.cli.main import main
@@ -15,8 +15,6 @@ from scantruss.studio.further_files import FURTHER_FILES, PRINTED, PRINTED_BALL,
 from scantruss.studio.outputs import settings_files
 from scantruss.studio.session import Session
 from scantruss.studio.tab_structure import scale_of_text, weight_bars
-
-PATIENCE = 120.0
 
 
 def check_further_files(session: Session, folder: Path) -> None:
@@ -42,17 +40,10 @@ def check_further_files(session: Session, folder: Path) -> None:
 
 
 def test_sizing_and_modes_are_those_of_the_command_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    x, y = (each.ravel() for each in np.meshgrid(np.linspace(0, 10, 50), np.linspace(0, 6, 30)))
-    np.savetxt(tmp_path / "dome.xyz", np.stack([x, y, 2 - 0.04 * ((x - 5) ** 2 + (y - 3) ** 2)], axis=1))
-    session = Session(tmp_path / "dome.scantruss")
-    session.open(tmp_path / "dome.xyz")
-    session.set_unit("m")
-    session.change("length", settings=session.settings.replace(length=2.5, effort="quick"))
-    session.generate()
-    assert session.worker.wait(PATIENCE) and session.message == ""
+    session = session_of_dome(tmp_path, 6.0)
     session.set_structure(loads="self,snow:1kN/m2", size=2, buckling=2, frequencies=1, scale=2.0)
     session.run_structure()
-    assert session.worker.wait(PATIENCE) and session.message == ""
+    done(session)
     report = session.state.report
     assert report is not None and report.weights is not None and sorted(report.weights) == [1, 2]
     assert report.weights[2] == report.truss.mass <= report.weights[1]

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from studio_dome import done, session_of_dome
 
 import scantruss as st
 from scantruss.cli.main import main
@@ -14,26 +15,6 @@ from scantruss.studio.outputs import command_of, settings_files
 from scantruss.studio.session import Session
 from scantruss.studio.trade_steps import Trade
 from scantruss.studio.trade_tool import curve_of, words_of_present
-
-PATIENCE = 120.0
-
-
-def made(folder: Path) -> Session:
-    """Generate a grid of few members over a shallow dome."""
-    x, y = (each.ravel() for each in np.meshgrid(np.linspace(0, 10, 50), np.linspace(0, 10, 50)))
-    np.savetxt(folder / "dome.xyz", np.stack([x, y, 2 - 0.04 * ((x - 5) ** 2 + (y - 5) ** 2)], axis=1))
-    session = Session(folder / "dome.scantruss")
-    session.open(folder / "dome.xyz")
-    session.set_unit("m")
-    session.change("length", settings=session.settings.replace(length=2.5, effort="quick"))
-    session.generate()
-    done(session)
-    return session
-
-
-def done(session: Session) -> None:
-    """Wait for what runs."""
-    assert session.worker.wait(PATIENCE) and session.message == ""
 
 
 def present(session: Session) -> Trade:
@@ -47,7 +28,7 @@ def present(session: Session) -> Trade:
 def test_what_is_taken_of_the_trade_is_what_the_command_line_makes(
     parts: str, tolerance: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    session = made(tmp_path)
+    session = session_of_dome(tmp_path, 10.0)
     before = session.grid
     assert before is not None
     session.find_trade(parts, tolerance, mirrored=parts == "panels")
@@ -83,7 +64,7 @@ def test_what_is_taken_of_the_trade_is_what_the_command_line_makes(
 def test_a_trade_needs_a_finished_grid_and_goes_with_it(tmp_path: Path) -> None:
     with pytest.raises(st.InputError, match="press Generate"):
         Session().find_trade("lengths", 0.01)
-    session = made(tmp_path)
+    session = session_of_dome(tmp_path, 10.0)
     with pytest.raises(st.InputError, match="press Find the trade"):
         session.take_traded(5)
     session.find_trade("lengths", 0.2)
@@ -102,7 +83,7 @@ def test_a_trade_needs_a_finished_grid_and_goes_with_it(tmp_path: Path) -> None:
 
 
 def test_the_curve_has_a_place_to_click_for_each_number(tmp_path: Path) -> None:
-    session = made(tmp_path)
+    session = session_of_dome(tmp_path, 10.0)
     session.find_trade("lengths", 0.2)
     done(session)
     trade = present(session)

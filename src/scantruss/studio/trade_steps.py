@@ -79,10 +79,10 @@ class TradeSteps(ScanSteps):
                 traded: tuple[Traded, ...] = ()
                 for turn, count in enumerate(COUNTS):
 
-                    def told(stage: str, share: float, turn: int = turn) -> None:
+                    def report(stage: str, share: float, turn: int = turn) -> None:
                         progress(stage, (turn + share) / len(COUNTS))
 
-                    traded += tuple(traded_lengths(before, tolerance, (count,), scan.farthest_node, told))
+                    traded += tuple(traded_lengths(before, tolerance, (count,), scan.farthest_node, report))
                     self.trade = Trade(before, parts, traded, off)
                     self.tell()
                 return

@@ -110,8 +110,8 @@ def curve_of(trade: Trade, present: int | None) -> str:
     height = len(charts) * (CHART_HEIGHT + CHART_GAP) + 20
     drawn = [_chart(across, k * (CHART_HEIGHT + CHART_GAP), *chart) for k, chart in enumerate(charts)]
     bottom, shown, order = height - 22, -np.inf, np.argsort(across)
-    halves = 0.5 * (across[order][1:] + across[order][:-1])
-    strips = zip(order.tolist(), [0.0, *halves.tolist()], [*halves.tolist(), float(CURVE_WIDTH)], strict=True)
+    middles = 0.5 * (across[order][1:] + across[order][:-1])
+    strips = zip(order.tolist(), [0.0, *middles.tolist()], [*middles.tolist(), float(CURVE_WIDTH)], strict=True)
     for k, left, right in strips:
         x, number = float(across[k]), trade.traded[k].number
         line = f'<line x1="{x:.1f}" x2="{x:.1f}" y1="14" y2="{bottom}" stroke="{PRESENT_COLOR}" stroke-width="2"/>'
