@@ -118,11 +118,14 @@ def test_a_missing_extra_is_one_line_with_the_command(tmp_path: Path, monkeypatc
     assert list(tmp_path.iterdir()) == []
 
 
-def test_members_without_triangles_are_no_grid(tmp_path: Path) -> None:
+def test_members_without_triangles_are_written_as_lines(tmp_path: Path) -> None:
     bar = make_truss([(0, 0, 0), (1, 0, 0)], [(0, 1)], {0: (np.inf,) * 6})
-    with pytest.raises(st.FormatError, match="members without"):
-        st.write(bar, tmp_path / "a.ply")
-    assert list(tmp_path.iterdir()) == []
+    for suffix in (".ply", ".obj"):
+        st.write(bar, tmp_path / f"a{suffix}")
+        assert read_model(tmp_path / f"a{suffix}").members.tolist() == [[0, 1]]
+    with pytest.raises(st.FormatError, match="on no panel"):
+        st.write(read_model(tmp_path / "a.ply"), tmp_path / "a.json")
+    assert not (tmp_path / "a.json").exists()
 
 
 def test_a_rich_grid_goes_through_every_format(tmp_path: Path) -> None:

@@ -82,7 +82,7 @@ def test_a_drawing_of_ezdxf_with_inexact_ends_and_polylines(tmp_path: Path) -> N
     model = read_model(tmp_path / "a.dxf")
     assert model.grid is not None and model.unit == "mm" and "not read: 1 CIRCLE" in model.notes[0]
     assert len(model.grid.triangles) == len(grid.triangles) and len(model.grid.edges) == len(grid.edges)
-    with pytest.raises(st.FormatError, match="on no panel"):
+    with pytest.raises(st.FormatError, match="pairs of ends within 154 of each other that are not joined"):
         read_model(tmp_path / "a.dxf", merge=0.1)
 
 
@@ -140,7 +140,6 @@ MOEBIUS = [(0, 1, 2), (1, 3, 2), (2, 3, 4), (3, 0, 4), (4, 0, 1)]
     ("text", "said"),
     [
         ("v 0 0 0\n", "no lines and no faces"),
-        ("v 0 0 0\nv 1 0 0\nl 1 2\n", "1 of 1 lines on no panel"),
         ("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 2\n", "meets itself"),
         ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 7\n", "names points that it does not have"),
         ("v 0 0 0\nv 1 0\nf 1 2 3\n", "line 2 is damaged"),
@@ -148,7 +147,6 @@ MOEBIUS = [(0, 1, 2), (1, 3, 2), (2, 3, 4), (3, 0, 4), (4, 0, 1)]
         ("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 0\nf 1 2 3\nl 1 4\n", "no longer than"),
         ("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 -1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\nf 1 2 5\n", "no surface"),
         ("v 0 0 0\nv 1 0 0\nv 0 1 0\nv -1 0 0\nv 0 -1 0\nf 1 2 3\nf 1 4 5\n", "no surface"),
-        ("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 -1 0\nv 0 0 1\nl 1 2\nl 1 3\nl 2 3\nl 1 4\nl 2 4\nl 1 5\nl 2 5\n", "more than two cycles"),
         ("".join(f"v {k * k} {k} {k**3}\n" for k in range(5)) + "".join(f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in MOEBIUS), "one side"),
         ("", "is empty"),
     ],

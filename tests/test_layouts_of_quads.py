@@ -12,7 +12,7 @@ from scantruss.cli.main import main
 from scantruss.export.json import encode_json
 from scantruss.grid.panels import sides_of, table_of, triangles_of
 from scantruss.layouts.families import lengths_needed
-from scantruss.structure.layered import grid_of_layers
+from scantruss.structure.layered import framework_of
 from scantruss.structure.statics import solve
 
 
@@ -96,7 +96,7 @@ def test_quads_held_at_their_boundary_are_no_mechanism_and_their_layers_are_seen
     for panel in truss.layers.panels:
         a, b, c = truss.nodes[panel[:3]]
         assert np.cross(b - a, c - b)[2] > 0
-    layered = grid_of_layers(truss)
+    layered = framework_of(truss)
     assert np.array_equal(layered.edges, truss.members) and layered.cells == "quad"
     assert np.bincount(layered.edge_uses[: len(grid.edges)]).tolist() == np.bincount(grid.edge_uses).tolist()
     assert (layered.edge_uses[len(grid.edges) :] == 0).all()

@@ -189,11 +189,16 @@ def test_what_is_said_twice_is_refused() -> None:
             st.schedule(roof(), st.ScheduleSettings(**values))
     with pytest.raises(st.InputError, match="no load case"):
         st.schedule(roof().replace(cases=(), combinations=()), st.ScheduleSettings())
-    truss = roof()
-    with pytest.raises(st.InputError, match="not the sides of its panels"):
-        st.schedule(truss.replace(triangles=truss.triangles[1:]), st.ScheduleSettings())
     with pytest.raises(st.InputError, match="--tube 114"):
         st.schedule(fan(1000.0), st.ScheduleSettings())
+
+
+def test_members_on_no_panel_are_scheduled_too() -> None:
+    truss = roof()
+    whole = st.schedule(truss, st.ScheduleSettings())
+    made = st.schedule(truss.replace(triangles=truss.triangles[:0]), st.ScheduleSettings())
+    assert set(made.members["group"]) == {"frame"} and len(made.panels) == 0
+    np.testing.assert_allclose(numbers(made.members, "cut length"), numbers(whole.members, "cut length"), rtol=1e-12)
 
 
 def test_the_command_takes_a_structure_with_what_it_says_of_the_checks(

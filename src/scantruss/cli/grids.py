@@ -41,7 +41,8 @@ def read_saved_grid(path: str, merge: float | None, bars: Bars | None = None) ->
     model = read_model(path, merge)
     for note in model.notes:
         bars.note(note) if bars else print_lines([note])
-    return model.as_grid("a command")
+    assert model.grid is not None  # drawings are no structures
+    return model.grid
 
 
 def read_grid_or_structure(

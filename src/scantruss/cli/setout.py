@@ -38,7 +38,7 @@ def setout_parser() -> Parser:
     add_outs(parser, "drawing .dxf or .pdf, tables .xlsx or .csv: the supports, the other tables beside it", "*")
     units = "|".join(unit for unit in UNITS if unit)
     for name, metavar, kind, said in (
-        ("supports", "WHERE", str, "of a grid: corners, boundary, lowest:H, fixed, line:NAME, loop:N, N001, several joined by +"),
+        ("supports", "WHERE", str, "of a grid: corners, boundary, lowest:H, fixed, ends, line:NAME, loop:N, N001, several joined by +"),
         ("joints", "TYPE", str, "of a grid: rigid (default) or pinned, while it is put up"),
         ("scale", "S", scale, "of a grid: size of the structure over that of the grid (default 1)"),
         ("unit", units, str, "unit of a grid that has none"),

@@ -31,7 +31,7 @@ OWN_OPTIONS = (  # name, metavar, help; the same names stand in a settings file
     ("section", "NAME|FILE", "CHS114.3x5 (default), CFCHS114.3x5 (cold formed), SHS100x5, IPE200, HEA200, R100x200 or FILE.csv[:NAME]"),
     ("material", "NAME|FILE", "S235 to S460 (default S355), 6082-T6, C24, GL24h or FILE.csv[:NAME]"),
     ("supports", "WHERE|FILE",
-     "corners, boundary, lowest:H, fixed, line:NAME, loop:N, a node such as N001, several joined by +, or a file of"
+     "corners, boundary, lowest:H, fixed, ends, line:NAME, loop:N, a node such as N001, several joined by +, or a file of"
      " positions X,Y,Z in the frame of the scan"),
     ("support_type", "TYPE", "pinned (default), fixed, roller or springs:K, with K such as 5MN/m"),
     ("joints", "TYPE",

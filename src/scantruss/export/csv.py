@@ -26,7 +26,7 @@ def nodes_path(path: Path) -> Path:
 
 def encode_csv(model: Model, path: Path, style: FileStyle) -> dict[Path, bytes]:
     """Return the two files: members at `path`, nodes beside it; with a decimal comma and semicolons if asked for."""
-    grid = members_of(model, "CSV")
+    grid = members_of(model)
     tables = {path: _members(grid, model), nodes_path(path): _nodes(grid, model)}
     return {place: encode_table(*table, decimal_comma=style.decimal_comma) for place, table in tables.items()}
 

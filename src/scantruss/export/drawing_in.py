@@ -1,4 +1,7 @@
-"""Lines and faces that others drew become a grid: ends merged to nodes, panels found among the lines, all wound alike."""
+"""Lines and faces that others drew become a grid: ends merged to nodes, panels found among the lines, all wound alike.
+
+Lines on no panel, such as props, ties and what a space frame is made of, are its members too.
+"""
 
 from __future__ import annotations
 
@@ -11,10 +14,20 @@ from ..grid.grid import Grid
 from ..grid.panels import first_triangles, loops_of, sides_of, table_of, triangles_of
 from ..grid.topology import wound_alike
 from ..kernels.geometry.components import component_labels
-from .drawing_panels import lines_on_no_panel, panels_among_lines, place_of, sides_on_no_line, without_diagonals
+from ..layouts.framework import Framework, outer_normals
+from .drawing_ends import check_ends
+from .drawing_panels import (
+    TooManyCyclesError,
+    lines_on_no_panel,
+    panels_among_lines,
+    place_of,
+    sides_on_no_line,
+    without_diagonals,
+)
 
 MERGE = 1e-3  #: distance within which ends are one node, in median lengths of lines
 FAR = 1e5  #: coordinates from which on nodes are kept relative to an origin [unit]
+NEARLY_JOINED = 0.05  #: distance within which nodes that no line joins, and nodes and lines, are taken for badly drawn, in median lengths
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,13 +47,13 @@ class Drawing:
 
 
 def grid_of_drawing(drawing: Drawing, name: str, merge: float | None = None) -> tuple[Grid, tuple[str, ...]]:
-    """Return the grid of a drawing, and notes on what it was made of.
+    """Return the grid of a drawing, a `Framework` where some lines are on no panel, and notes on what it was made of.
 
     Parameters
     ----------
     drawing : Drawing
         Where it has faces, these are the panels; else closed polylines, if all lines are sides of these; else the cycles of three
-        lines, and of four where some lines are on none of three.
+        lines, and of four, if they are a surface.
     name : str
         Of the file, for messages.
     merge : float, optional
@@ -49,7 +62,7 @@ def grid_of_drawing(drawing: Drawing, name: str, merge: float | None = None) -> 
     Raises
     ------
     FormatError
-        There is nothing, lines that are on no panel, or panels that are no surface.
+        There is nothing, faces are no surface, or lines nearly meet and are not joined.
     """
     if merge is not None and not 0 <= merge < np.inf:
         raise FormatError(f"--merge must be a distance of 0 or more, got {merge!r}")
@@ -58,8 +71,8 @@ def grid_of_drawing(drawing: Drawing, name: str, merge: float | None = None) -> 
         raise FormatError(f"{name} has no lines and no faces{drawing.left}; a grid needs them")
     if not np.isfinite(drawing.points[pairs]).all():
         raise FormatError(f"{name} has an end that is no number; export it again")
-    lengths = np.linalg.norm(drawing.points[pairs[:, 1]] - drawing.points[pairs[:, 0]], axis=1)
-    reach = MERGE * float(np.median(lengths)) if merge is None else merge
+    median = float(np.median(np.linalg.norm(drawing.points[pairs[:, 1]] - drawing.points[pairs[:, 0]], axis=1)))
+    reach = MERGE * median if merge is None else merge
     points, number = _merged(drawing, np.unique(pairs), reach)
     if (short := number[pairs[:, 0]] == number[pairs[:, 1]]).any():
         where = place_of(drawing.points[pairs[short][0, 0]])
@@ -67,30 +80,48 @@ def grid_of_drawing(drawing: Drawing, name: str, merge: float | None = None) -> 
             f"{name} has {short.sum():,} lines or sides no longer than {reach:.3g}, one at {where}; take a smaller --merge"
         )
     lines = np.unique(np.sort(number[drawing.lines], axis=1), axis=0)
-    panels, how = _panels(drawing, lines, number, points, name)
-    if twice := [loop for loop in loops_of(panels) if len(set(loop)) < len(loop)]:
-        raise FormatError(f"{name} has a face that meets itself at {place_of(points[twice[0][0]])}; split it")
-    if len(loose := lines_on_no_panel(lines, panels)):
-        where = place_of(points[lines[loose[0]]].mean(axis=0))
-        raise FormatError(
-            f"{name} has {len(loose):,} of {len(lines):,} lines on no panel of three or four sides, one at {where}; take them out,"
-            " split lines at their nodes, draw panels of more sides as faces, or give a larger --merge"
-        )
     far = float(np.abs(points).max()) > FAR
     origin = np.round((points.min(axis=0) + points.max(axis=0)) / 2) if far else np.zeros(3)
-    grid = _grid(points - origin, panels, origin, drawing)
+    nodes = points - origin
+    panels, how = _surface(drawing, lines, number, nodes, origin, name)
+    loose = lines[lines_on_no_panel(lines, panels)]
+    grid = _grid(nodes, panels, origin, drawing)
+    if len(loose):
+        members = np.unique(np.concatenate([np.sort(sides_of(panels), axis=1), loose]), axis=0)
+        check_ends(members, points, reach, max(NEARLY_JOINED * median, reach), name)
+        grid = _framework(grid, members, name)
+        if len(panels):
+            how += f"; {len(loose):,} of its {len(lines):,} lines are on no panel, and members all the same, one at "
+            how += place_of(points[loose[0]].mean(axis=0))
+    return grid, (f"{name} has no certificate: it was compared with no scan{how}{drawing.left}",)
+
+
+def _surface(
+    drawing: Drawing, lines: np.ndarray, number: np.ndarray, nodes: np.ndarray, origin: np.ndarray, name: str
+) -> tuple[np.ndarray, str]:
+    """Return the panels (P, K), wound alike, and how they were found in words; none where lines enclose no surface."""
+    try:
+        panels, how = _panels(drawing, lines, number, nodes + origin, name)
+    except TooManyCyclesError as error:
+        return np.zeros((0, 3), np.int64), f"; it has no panels, as loads on areas need: {error}"
+    if twice := [loop for loop in loops_of(panels) if len(set(loop)) < len(loop)]:
+        raise FormatError(f"{name} has a face that meets itself at {place_of((nodes + origin)[twice[0][0]])}; split it")
+    if not len(panels):
+        return panels, "; it has no panels, as loads on areas need"
+    grid = _grid(nodes, panels, origin, drawing)
+    why = ""
     if not grid.topology.manifold:
-        raise FormatError(
-            f"{name} is no surface: an edge has more than two panels, or panels meet at a node only; take out what is double"
-        )
-    if not grid.topology.orientable:
-        raise FormatError(f"{name} is a surface with one side only; cut it open")
+        why = f"{name} is no surface: an edge has more than two panels, or panels meet at a node only; take out what is double"
+    elif not grid.topology.orientable:
+        why = f"{name} is a surface with one side only; cut it open"
+    if why and len(drawing.faces):
+        raise FormatError(why)
+    if why:
+        return panels[:0], f"; it has no panels, as loads on areas need: {why}"
     panels = _turned(panels, (wound_alike(grid) != grid.triangles).any(axis=1))
     if not len(drawing.faces):
-        grid = _grid(grid.nodes, panels, origin, drawing)
-        panels = _turned(panels, _looks_inwards(grid))
-    note = f"{name} has no certificate: it was compared with no scan{how}{drawing.left}"
-    return _grid(grid.nodes, panels, origin, drawing), (note,)
+        panels = _turned(panels, _looks_inwards(_grid(nodes, panels, origin, drawing)))
+    return panels, how
 
 
 def _panels(
@@ -126,6 +157,26 @@ def _grid(nodes: np.ndarray, panels: np.ndarray, origin: np.ndarray, drawing: Dr
         origin=origin,
         unit=drawing.unit,
         system=drawing.system,
+    )
+
+
+def _framework(grid: Grid, members: np.ndarray, name: str) -> Framework:
+    """Return a grid with members (E, 2), of which some are sides of no panel; nodes without panels have normals that point up."""
+    triangle_sides = np.unique(np.sort(sides_of(grid.triangles), axis=1), axis=0)
+    across = triangle_sides[lines_on_no_panel(triangle_sides, grid.panel_table)]
+    if len(wrong := np.delete(members, lines_on_no_panel(members, across), axis=0)):
+        where = place_of((grid.nodes + grid.origin)[wrong[0]].mean(axis=0))
+        raise FormatError(f"{name} has lines across its faces, one at {where}; draw what they divide as faces")
+    return Framework(
+        nodes=grid.nodes,
+        triangles=grid.triangles,
+        panels=grid.panels,
+        fixed=grid.fixed,
+        origin=grid.origin,
+        unit=grid.unit,
+        system=grid.system,
+        own_members=members,
+        own_normals=outer_normals(grid),
     )
 
 

@@ -11,6 +11,10 @@ from ..kernels.geometry.components import component_labels
 MOST_WEDGES = 50_000_000  #: pairs of lines at a node that are looked at
 
 
+class TooManyCyclesError(FormatError):
+    """Lines of which it cannot be told what panels they enclose."""
+
+
 def place_of(point: np.ndarray) -> str:
     """Return a place in words."""
     return ", ".join(f"{value:.6g}" for value in point)
@@ -24,7 +28,7 @@ def _keys(pairs: np.ndarray) -> np.ndarray:
 
 
 def lines_on_no_panel(lines: np.ndarray, panels: np.ndarray) -> np.ndarray:
-    """Return which lines (L, 2) are no side of a panel, which a grid cannot hold."""
+    """Return which lines (L, 2) are no side of a panel."""
     return np.flatnonzero(~np.isin(_keys(lines), _keys(sides_of(panels))))
 
 
@@ -98,22 +102,25 @@ def _loop_of(sides: list[list[int]]) -> list[int] | None:
 
 
 def panels_among_lines(lines: np.ndarray, points: np.ndarray, name: str) -> np.ndarray:
-    """Return the panels (P, 3 or 4) of lines: cycles of three, and of four, filled up with -1, where some lines are on none of three.
+    """Return the panels (P, 3 or 4) of lines: cycles of three, and of four, filled up with -1, where these take in all lines or half.
 
-    A cycle that separates panels on both sides of all its lines is none.
+    A cycle that separates panels on both sides of all its lines is none. Where few lines are on no cycle of three, and some on none
+    of four either, these are props and ties, and the cycles of four that they make are no panels.
 
     Raises
     ------
-    FormatError
+    TooManyCyclesError
         A line is left with more than two.
     """
     triangles = _cycles_of_three(lines, name)
     panels = _between_none(triangles, lines, points, name)
-    if not len(lines_on_no_panel(lines, panels)):
+    loose = len(lines_on_no_panel(lines, panels))
+    if not loose or not len(quads := _cycles_of_four(lines, name)):
         return panels
-    quads = _cycles_of_four(lines, name)
-    whole = np.concatenate([np.pad(panels, ((0, 0), (0, 1)), constant_values=-1), quads])
-    return _between_none(whole, lines, points, name) if len(quads) else panels
+    both = np.concatenate([np.pad(panels, ((0, 0), (0, 1)), constant_values=-1), quads])
+    if 2 * loose < len(lines) and len(lines_on_no_panel(lines, both)):
+        return panels
+    return _between_none(both, lines, points, name)
 
 
 def _between_none(panels: np.ndarray, lines: np.ndarray, points: np.ndarray, name: str) -> np.ndarray:
@@ -128,7 +135,7 @@ def _between_none(panels: np.ndarray, lines: np.ndarray, points: np.ndarray, nam
     wrong = np.concatenate([np.flatnonzero(left > 2), taken_twice[left[taken_twice] < 2]])
     if wrong.size:
         where = place_of(points[lines[wrong[0]]].mean(axis=0))
-        raise FormatError(
+        raise TooManyCyclesError(
             f"{name} has lines with more than two cycles of three or four lines, one at {where}; export its panels as faces"
         )
     return panels[~between]
@@ -138,7 +145,7 @@ def _pairs_of_equals(values: np.ndarray, name: str) -> tuple[np.ndarray, np.ndar
     """Return all pairs of places in a sorted array that hold the same value, the earlier ones and the later ones."""
     later = np.searchsorted(values, values, side="right") - np.arange(len(values)) - 1
     if later.sum() > MOST_WEDGES:
-        raise FormatError(f"{name} has nodes with too many lines to be a grid")
+        raise TooManyCyclesError(f"{name} has nodes with too many lines to be a grid")
     first = np.repeat(np.arange(len(values)), later)
     return first, first + 1 + np.arange(len(first)) - np.repeat(np.cumsum(later) - later, later)
 

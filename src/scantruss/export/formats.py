@@ -81,9 +81,9 @@ FORMATS: dict[str, FileFormat] = {
     ),
     ".json": FileFormat("JSON", lambda model, path, style: {path: function("json.encode_model")(model)},
                         read=function("json.read_json")),
-    ".obj": FileFormat("OBJ", lambda model, path, style: {path: function("obj.encode_obj")(members_of(model, "OBJ"), style.obj)},
+    ".obj": FileFormat("OBJ", lambda model, path, style: {path: function("obj.encode_obj")(members_of(model), style.obj)},
                        draw=function("drawing_files.draw_obj"), loses="marks or groups", loses_of_structure=NO_STRUCTURE),
-    ".ply": FileFormat("PLY", lambda model, path, style: {path: function("ply.encode_ply")(members_of(model, "PLY"))},
+    ".ply": FileFormat("PLY", lambda model, path, style: {path: function("ply.encode_ply")(members_of(model))},
                        draw=function("drawing_files.draw_ply"), loses="marks or groups", loses_of_structure=NO_STRUCTURE),
     ".png": FileFormat("PNG", lambda model, path, style: {
         path: function("drawing.picture.encode_picture")(model.as_grid("PNG"), model.cloud, style=style)}, holds=(GRID,)),

@@ -16,9 +16,10 @@ from ..grid.groups import member_groups
 from ..grid.line_sets import FIXED_LINE, LineSet
 from ..grid.marks import member_marks, node_marks, numbered, panel_marks
 from ..grid.panels import loops_of
+from ..layouts.framework import Framework
 from ..settings import UNITS
 from ..structure.groups import member_groups_of
-from ..structure.layered import grid_of_layers
+from ..structure.layered import framework_of
 
 if TYPE_CHECKING:
     from ..scan.cloud import PointCloud
@@ -47,7 +48,7 @@ class Model:
     groups: tuple[str, ...]  #: names of the groups of members, sorted
     group_of: np.ndarray  #: (M,) int64, which group
     node_sets: dict[str, np.ndarray] = field(default_factory=dict)  #: such as fixed, boundary, line:NAME: int64
-    grid: Grid | None = None  #: None where members have no triangles
+    grid: Grid | None = None  #: None of a structure with members on no panel
     truss: Truss | None = None  #: sections, material, supports and loads, of a structure
     solution: Solution | None = None  #: of the structure, where it is solved
     report: StructureReport | None = None  #: of the solution
@@ -97,24 +98,25 @@ class Model:
         Raises
         ------
         FormatError
-            Some members belong to no triangle, which the format `what` cannot hold.
+            Some members are sides of no panel, which the format `what` cannot hold.
         """
-        if self.grid is None:
-            raise FormatError(f"{what} holds triangles, and this structure has members without; use another format")
+        if self.grid is None or isinstance(self.grid, Framework):
+            way = (
+                "use another format"
+                if self.truss
+                else "make a structure of it (scantruss structure), or use another format"
+            )
+            raise FormatError(f"{what} holds panels and their sides, and some members here are on no panel; {way}")
         return self.grid
 
 
-def members_of(model: Model, what: str) -> Grid:
-    """Return the grid of a model with all its members, those of layers too.
-
-    Raises
-    ------
-    FormatError
-        Some members belong neither to a triangle nor to a layer.
-    """
-    if model.truss is not None and model.truss.layers is not None:
-        return grid_of_layers(model.truss)
-    return model.as_grid(what)
+def members_of(model: Model) -> Grid:
+    """Return the grid of a model with all its members, those on no panel too."""
+    if model.grid is not None:
+        return model.grid
+    if model.truss is None:
+        raise TypeError("a model is of a grid or of a structure")
+    return framework_of(model.truss)
 
 
 def model_of_grid(grid: Grid, cloud: PointCloud | None = None) -> Model:
@@ -149,11 +151,7 @@ def model_of_truss(
     """Return the model of a structure, in metres."""
     grid = _grid_of(truss)
     model = model_of_grid(grid) if np.array_equal(grid.edges, np.sort(truss.members, axis=1)) else None
-    groups, group_of = (
-        (model.groups, model.group_of) if model else (("members",), np.zeros(len(truss.members), np.int64))
-    )
-    if truss.member_sets:
-        groups, group_of = member_groups_of(truss)
+    groups, group_of = (model.groups, model.group_of) if model else member_groups_of(truss)
     return Model(
         local=truss.nodes,
         origin=truss.origin,

@@ -13,7 +13,7 @@ from ..errors import InputError, unit_words, words_of_number
 from ..grid.certificate import check_passed
 from ..grid.grid import Grid
 from ..grid.marks import member_marks, node_marks
-from ..layouts.layered_grid import LayeredGrid
+from ..layouts.framework import outer_normals
 from ..runtime.files import check_place, write_files
 from .engraving import engraved, engraved_member
 from .solid_files import Solid, encode_3mf, encode_stl
@@ -204,18 +204,6 @@ def marked_bars(
         way, room = (b - a) / length, length - sum(taken)
         made.append(engraved_member(bar, radius, sides, name, a + way * (taken[0] + room / 2), way, normal, room))
     return made
-
-
-def outer_normals(grid: Grid) -> np.ndarray:
-    """Return the unit normal of each node (V, 3); up where it has none."""
-    if isinstance(grid, LayeredGrid):
-        return grid.own_normals
-    a, b, c = grid.nodes[grid.triangles].transpose(1, 0, 2)
-    total = np.zeros((len(grid.nodes), 3))
-    for corner in grid.triangles.T:
-        np.add.at(total, corner, np.cross(b - a, c - a))
-    length = np.linalg.norm(total, axis=1, keepdims=True)
-    return np.where(length > 0, total / np.where(length > 0, length, 1.0), [0.0, 0.0, 1.0])
 
 
 def bars_of(nodes: np.ndarray, edges: np.ndarray, radius: float, sides: int) -> list[Any]:

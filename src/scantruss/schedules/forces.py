@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..grid.grid import Grid
-from ..structure.layered import grid_of_layers, grid_of_triangles
+from ..structure.layered import framework_of, grid_of_triangles
 from ..structure.report import report_structure
 from ..structure.statics import solve
 
@@ -58,20 +58,17 @@ def grid_of_structure(truss: Truss) -> tuple[Grid, np.ndarray]:
     Raises
     ------
     InputError
-        Its members are neither the sides of its triangles nor those of layers.
+        It has layers, and does not say which.
     """
-    if truss.layers is not None:
-        return grid_of_layers(truss, truss.scale), np.arange(len(truss.members))
     grid = grid_of_triangles(truss, truss.scale)
     count = len(truss.nodes)
     theirs, mine = np.sort(truss.members, axis=1) @ [count, 1], grid.edges @ [count, 1]
     order = np.argsort(theirs, kind="stable")
-    if not np.array_equal(theirs[order], mine):
-        old = "; this one of two layers is of an earlier version, make it again" if truss.member_sets else ""
-        raise InputError(
-            f"the members of the structure are not the sides of its panels; schedules need a structure made of a grid{old}"
-        )
-    return grid, order
+    if truss.layers is None and np.array_equal(theirs[order], mine):
+        return grid, order
+    if truss.layers is None and truss.member_sets:
+        raise InputError("this structure of two layers is of an earlier version; make it again")
+    return framework_of(truss, truss.scale), np.arange(len(truss.members))
 
 
 def find_forces(truss: Truss, order: np.ndarray, checked: Checked | None = None) -> Forces:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..grid.marks import numbered
-from ..layouts.layered_grid import LayeredGrid
+from ..layouts.framework import Framework
 from .clusters import Clusters, cluster_polygons
 from .records import Column, Schedule, column
 
@@ -15,9 +15,9 @@ if TYPE_CHECKING:
     from .parts import Parts
 
 
-def layered_grid(parts: Parts) -> LayeredGrid | None:
+def layered_grid(parts: Parts) -> Framework | None:
     """Return the grid of the parts if it has more layers."""
-    return parts.grid if isinstance(parts.grid, LayeredGrid) else None
+    return parts.grid if isinstance(parts.grid, Framework) and parts.grid.layers is not None else None
 
 
 def layer_column(parts: Parts, nodes: np.ndarray) -> list[Column]:

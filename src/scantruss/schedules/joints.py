@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..grid.marks import member_marks, node_marks, panel_marks
-from ..layouts.layered_grid import LayeredGrid
+from ..layouts.framework import Framework
 
 if TYPE_CHECKING:
     from ..grid.grid import Grid
@@ -59,7 +59,7 @@ def node_normals(grid: Grid) -> np.ndarray:
     The mean of the normals of its triangles, weighted by their angles there (Thuermer and Wuethrich, Computing vertex normals from
     polygonal facets, Journal of Graphics Tools 3(1), 1998): it does not depend on how the surface is cut into triangles.
     """
-    if isinstance(grid, LayeredGrid):
+    if isinstance(grid, Framework):
         return grid.own_normals
     a, b, c = (grid.nodes[grid.triangles[:, k]] for k in range(3))
     normal = np.cross(b - a, c - a)
@@ -79,14 +79,14 @@ def check_grid(grid: Grid) -> None:
     InputError
         It has no members, is no oriented manifold, or has a member or panel without size.
     """
-    if len(grid.triangles) == 0:
+    if len(grid.edges) == 0:
         raise InputError("the grid has no members, so there is nothing to schedule; give one with a triangle at least")
     if not (grid.topology.manifold and grid.topology.orientable):
         words = "not manifold" if grid.topology.orientable else "one-sided"
         raise InputError(
             f"the grid is {words}, so its nodes have no outer side; schedules need one that passes its certificate"
         )
-    if not np.isfinite(grid.nodes[np.unique(grid.triangles)]).all():
+    if not np.isfinite(grid.nodes[np.unique(grid.edges)]).all():
         raise InputError("a node of the grid is nowhere (NaN); schedules need a grid that passes its certificate")
     if (short := np.flatnonzero(grid.lengths == 0.0)).size:
         raise InputError(f"member {member_marks(grid)[short[0]]} has no length; merge its nodes first")
@@ -145,7 +145,7 @@ def find_joints(grid: Grid) -> Joints:
         pairs=pairs,
         angle=angle,
         bolt=np.zeros(len(node), np.int64),
-        one_layer=not isinstance(grid, LayeredGrid),
+        one_layer=not isinstance(grid, Framework),
     )
 
 

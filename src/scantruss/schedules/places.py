@@ -38,7 +38,7 @@ def building_places(grid: Grid, settings: BuildingFrame) -> np.ndarray:
         shift = np.asarray(grid.origin, float) - np.asarray(settings.origin, float)
         return into_building(grid.nodes + shift, settings)
     places = into_building(grid.nodes, settings)
-    return places - places[np.unique(grid.triangles)].min(axis=0)
+    return places - places[np.unique(grid.edges)].min(axis=0)
 
 
 def boundary_nodes(grid: Grid) -> np.ndarray:
@@ -54,7 +54,7 @@ def rings(grid: Grid, height: np.ndarray, start: np.ndarray | None = None) -> np
     A piece that has none of these starts at its lowest node.
     """
     ring = np.full(len(grid.nodes), -1, np.int64)
-    used = np.unique(grid.triangles)
+    used = np.unique(grid.edges)
     reached = np.zeros(len(ring), bool)
     reached[used] = (boundary_nodes(grid) if start is None else start)[used]
     piece = component_labels(len(grid.nodes), grid.edges[:, 0], grid.edges[:, 1])

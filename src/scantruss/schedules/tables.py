@@ -119,7 +119,7 @@ def _nodes(parts: Parts, ring: np.ndarray, mass: np.ndarray | None) -> Schedule:
     joints, used = parts.joints, np.flatnonzero(parts.joints.valence)
     least, turn = np.full((2, len(joints.valence)), np.inf)
     np.minimum.at(least, joints.node[joints.pairs[:, 0]], joints.angle)
-    np.minimum.at(turn, joints.node, joints.turn_to_next)
+    np.fmin.at(turn, joints.node, joints.turn_to_next)  # NaN at a node of one member
     return Schedule(
         "Nodes",
         (

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..grid.grid import Grid
-from ..layouts.layered_grid import LayeredGrid
+from ..layouts.framework import Framework
 from .settings import MOST_SECTIONS, Cut, SetoutSettings
 
 AT_NODE = 1e-9  # share of a member within which a section meets its node
@@ -67,13 +67,13 @@ def cut_grid(grid: Grid, places: np.ndarray, plane: Cut) -> SectionLine:
 
 def _set_out(grid: Grid) -> np.ndarray:
     """Return of which members (E,) the heights are set out: all but webs."""
-    return grid.is_chord() if isinstance(grid, LayeredGrid) else np.ones(len(grid.edges), bool)
+    return grid.is_chord() if isinstance(grid, Framework) else np.ones(len(grid.edges), bool)
 
 
 def _inner_segments(grid: Grid, places: np.ndarray, axis: int, place: float) -> np.ndarray:
     """Return the segments (S, 2, 3) in which a plane cuts the panels of lower layers."""
     found = [np.zeros((0, 2, 3))]
-    panels = grid.layers.panels if isinstance(grid, LayeredGrid) and grid.layers is not None else ()
+    panels = grid.layers.panels if isinstance(grid, Framework) and grid.layers is not None else ()
     for panel in panels:
         corners = places[panel]
         off, following = corners[:, axis] - place, np.roll(corners, -1, axis=0)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..layouts.layered_grid import LayeredGrid
+from ..layouts.framework import Framework
 
 if TYPE_CHECKING:
     from .make import SettingOut
@@ -73,7 +73,7 @@ def make_sheets(made: SettingOut) -> list[Sheet]:
 
 def _plans(made: SettingOut) -> list[tuple[str, np.ndarray]]:
     """Return the titles of the plans and their members."""
-    if not isinstance(made.grid, LayeredGrid):
+    if not isinstance(made.grid, Framework) or made.grid.layers is None:
         return [("Plan", np.arange(len(made.grid.edges)))]
     groups = np.array(made.grid.own_groups)
     return [(f"Plan, {name}", np.flatnonzero(groups == name)) for name in dict.fromkeys(made.grid.own_groups)]

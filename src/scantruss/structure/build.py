@@ -14,6 +14,7 @@ from ..grid.marks import member_marks, node_marks, numbered
 from ..grid.panels import first_triangles, turned_panels
 from ..layouts.double_layer import DoubleLayer
 from ..layouts.double_layer import double_layer as make_double_layer
+from ..layouts.framework import Framework
 from ..scan.vectors import units
 from ..settings import UNITS
 from .areas import turned_pieces
@@ -92,6 +93,10 @@ def truss_of_grid(
         alike=None if grid.alike is None else replace(grid.alike, member=grid.alike.member * metres),
     )
     held = support_nodes(truss, supports)
+    if layered and isinstance(grid, Framework):
+        raise InputError(
+            "a double layer is made of panels, and some members of the grid are on none; leave it out, or take them out"
+        )
     if layered:
         outer = grid.replace(nodes=nodes, triangles=triangles, panels=truss.panels, origin=truss.origin, unit="m")
         layers = make_double_layer(

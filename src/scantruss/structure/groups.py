@@ -7,6 +7,7 @@ import re
 import numpy as np
 
 from ..errors import InputError
+from ..grid.groups import BOUNDARY, FRAME, INNER
 from ..kernels.geometry.components import component_labels
 from .truss import Truss
 
@@ -19,9 +20,10 @@ def member_groups_of(truss: Truss, by: str = "groups") -> tuple[tuple[str, ...],
     Parameters
     ----------
     truss : Truss
-        Its triangles tell the boundary, its sets of nodes the lines.
+        Its triangles tell the boundary and what is on no panel, its sets of nodes the lines.
     by : str
-        "groups": boundary, the lines of the grid by name, and inner, in each piece; top, bottom and web of a double layer.
+        "groups": boundary, the lines of the grid by name, inner, and frame (on no panel), in each piece; top, bottom and web of a
+        double layer.
         "rings": "ring 0" touches the boundary, "ring 1" is the next towards the middle, and so on; "no ring" where there is none.
 
     Raises
@@ -43,20 +45,25 @@ def member_groups_of(truss: Truss, by: str = "groups") -> tuple[tuple[str, ...],
 
 def boundary_members(truss: Truss) -> np.ndarray:
     """Return whether each member (M,) is a side of one triangle only."""
+    return _triangles_at(truss) == 1
+
+
+def _triangles_at(truss: Truss) -> np.ndarray:
+    """Return the number of triangles at each member (M,)."""
     sides = np.sort(truss.triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    count = len(truss.nodes)
-    key, times = np.unique(sides[:, 0] * count + sides[:, 1], return_counts=True)
-    ends = np.sort(truss.members, axis=1)
-    return np.isin(ends[:, 0] * count + ends[:, 1], key[times == 1])
+    keys, ends = (np.sort(each, axis=1) @ [len(truss.nodes), 1] for each in (sides, truss.members))
+    keys = np.sort(keys)
+    return np.searchsorted(keys, ends, side="right") - np.searchsorted(keys, ends)
 
 
 def _lines(truss: Truss) -> list[str]:
-    """Return for each member the line that it lies on, boundary or inner."""
-    words = np.full(len(truss.members), "inner", object)
+    """Return for each member the line that it lies on, boundary, inner or frame."""
+    words = np.full(len(truss.members), INNER, object)
     for name, nodes in truss.node_sets.items():
         if name.startswith("line:"):
             words[np.isin(truss.members, nodes).all(axis=1)] = name
-    words[boundary_members(truss)] = "boundary"
+    words[boundary_members(truss)] = BOUNDARY
+    words[_triangles_at(truss) == 0] = FRAME
     for name, members in truss.member_sets.items():
         words[members] = name
     return words.tolist()

@@ -1,4 +1,4 @@
-"""The grid of a structure, of one layer or more, for what is made of grids: schedules, setting out, printed models, files."""
+"""The grid of a structure, with members on no panel too, for what is made of grids: schedules, setting out, printed models, files."""
 
 from __future__ import annotations
 
@@ -6,20 +6,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..errors import InputError
 from ..grid.grid import Grid
-from ..layouts.layered_grid import LayeredGrid
+from ..layouts.framework import NO_PANELS_NORMAL, Framework
 from .truss import Truss
 
 
-def grid_of_layers(truss: Truss, scale: float = 1.0) -> LayeredGrid:
-    """Return the grid of a structure that has layers, its members in their order, lengths in metres over a scale."""
+def framework_of(truss: Truss, scale: float = 1.0) -> Framework:
+    """Return the grid of a structure of which some members are on no panel, all in their order, lengths in metres over a scale."""
     groups = np.full(len(truss.members), "", object)
     for name, members in truss.member_sets.items():
         groups[members] = name
     fixed = np.zeros(len(truss.nodes), bool)
     fixed[truss.node_sets.get("fixed", np.zeros(0, np.int64))] = True
-    return LayeredGrid(
+    return Framework(
         nodes=truss.nodes / scale,
         triangles=truss.triangles,
         panels=truss.panels,
@@ -27,8 +26,8 @@ def grid_of_layers(truss: Truss, scale: float = 1.0) -> LayeredGrid:
         origin=truss.origin / scale,
         unit="m",
         own_members=truss.members,
-        own_normals=truss.node_normals,
-        own_groups=tuple(groups.tolist()),
+        own_normals=np.where(truss.node_normals.any(axis=1, keepdims=True), truss.node_normals, NO_PANELS_NORMAL),
+        own_groups=tuple(groups.tolist()) if truss.layers is not None else (),
         layers=truss.layers,
     )
 
@@ -47,17 +46,11 @@ def grid_of_triangles(truss: Truss, scale: float = 1.0) -> Grid:
 
 
 def grid_in_metres(truss: Truss) -> Grid:
-    """Return the grid of a structure with all its members, in metres as it is built.
-
-    Raises
-    ------
-    InputError
-        Some members are neither sides of triangles nor of layers.
-    """
-    if truss.layers is not None:
-        return grid_of_layers(truss)
+    """Return the grid of a structure with all its members, in metres as it is built."""
     grid = grid_of_triangles(truss)
     count = len(truss.nodes)
-    if not np.array_equal(np.sort(np.sort(truss.members, axis=1) @ [count, 1]), grid.edges @ [count, 1]):
-        raise InputError("some members of the structure are neither sides of its panels nor of layers; print the grid")
-    return grid
+    if truss.layers is None and np.array_equal(
+        np.sort(np.sort(truss.members, axis=1) @ [count, 1]), grid.edges @ [count, 1]
+    ):
+        return grid
+    return framework_of(truss)

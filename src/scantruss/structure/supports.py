@@ -22,15 +22,22 @@ SUPPORT_TURN = 45.0  #: least turn of the boundary, seen over two members to eit
 SHARP_TURN = (
     40.0  #: least turn at one node, seen over one member and over two, that makes it a corner beside others [degree]
 )
-SUPPORT_WAYS = "corners, boundary, lowest:H, fixed, line:NAME, loop:N"
+SUPPORT_WAYS = "corners, boundary, lowest:H, fixed, ends, line:NAME, loop:N"
 OTHER_WAYS = f"name others with --supports: {SUPPORT_WAYS}, a node such as N001 or a file of positions"
-SUPPORT_WORDS = ("corners", "boundary", "fixed")  #: of these, those without a value
+SUPPORT_WORDS = ("corners", "boundary", "fixed", "ends")  #: of these, those without a value
 HELD = {"pinned": (math.inf,) * 3 + (0.0,) * 3, "fixed": (math.inf,) * 6, "roller": (0.0, 0.0, math.inf, 0.0, 0.0, 0.0)}
 
 
 def node_sets(grid: Grid) -> dict[str, np.ndarray]:
-    """Return what the grid names: "fixed", "boundary" (the longest loop of each piece), "loop:1", ..., "corners", "line:NAME"."""
+    """Return what the grid names.
+
+    "fixed", "boundary" (the longest loop of each piece), "loop:1", ..., "corners", "line:NAME", and "ends": the nodes of one member,
+    such as the feet of columns.
+    """
     sets = {"fixed": np.flatnonzero(grid.fixed)}
+    ends = np.flatnonzero(np.bincount(grid.edges.ravel(), minlength=len(grid.nodes)) == 1)
+    if len(ends):
+        sets["ends"] = ends
     loops = sorted(grid.boundary_loops, key=lambda loop: -_length(grid.nodes[loop]))
     piece = component_labels(len(grid.nodes), grid.edges[:, 0], grid.edges[:, 1])
     longest = {int(piece[loop[0]]): loop for loop in reversed(loops)}
@@ -104,7 +111,8 @@ def _nodes_of(truss: Truss, word: str) -> np.ndarray:
         raise InputError(f"no supports: the grid has no {word}; {OTHER_WAYS}")
     names = [name for name in truss.node_sets if name.startswith(("line:", "loop:"))]
     if word in ("corners", "boundary"):
-        raise InputError(f"no supports: the grid is closed and has no {word}; use lowest:H or fixed nodes")
+        why = "is closed" if len(truss.triangles) else "is without panels"
+        raise InputError(f"no supports: the grid {why} and has no {word}; use lowest:H or fixed nodes")
     if word.startswith(("line:", "loop:")) and names:
         near = get_close_matches(word, names, 3, 0.0)
         raise InputError(f"no supports: the grid has no {word}; nearest are {' '.join(near)}")

@@ -67,7 +67,9 @@ class StructureTab:
     def __init__(self, view: StudioView, gui: Any) -> None:
         self.view = view
         kept = view.session.state.structure_settings
-        hint = "corners, boundary, lowest:H, fixed, line:NAME, loop:N, N001, joined by +; or set a click to support"
+        hint = (
+            "corners, boundary, lowest:H, fixed, ends, line:NAME, loop:N, N001, joined by +; or set a click to support"
+        )
         self.words = {
             "supports": gui.add_text("supports", kept.supports, hint=hint),
             "support_type": gui.add_dropdown("held as", tuple(HELD), initial_value=kept.support_type),

@@ -17,7 +17,8 @@ from ...errors import InputError, unit_words
 from ...grid.grid import Grid
 from ...grid.marks import member_marks, numbered
 from ...kernels.geometry.components import component_labels
-from ..solid import balls_of, bars_of, check_diameters, marked_bars, outer_normals, unite
+from ...layouts.framework import outer_normals
+from ..solid import balls_of, bars_of, check_diameters, marked_bars, unite
 from .plates import Bed, PrintedPart
 
 PEG_SIDES = 32

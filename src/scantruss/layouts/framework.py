@@ -1,4 +1,4 @@
-"""A grid of more layers: the outer one has panels, the others and the webs are members alone."""
+"""A grid of which some members are sides of no panel: those of lower layers and webs, and those that others drew."""
 
 from __future__ import annotations
 
@@ -10,14 +10,16 @@ import numpy as np
 from ..grid.grid import Grid
 from .double_layer import Layers
 
+NO_PANELS_NORMAL = (0.0, 0.0, 1.0)  #: of a node without panels: up
 
-@dataclass(frozen=True, eq=False)
-class LayeredGrid(Grid):
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Framework(Grid):
     """A grid of which some members are sides of no panel; its tables hold all members, in their own order."""
 
     own_members: np.ndarray = field(default_factory=lambda: np.zeros((0, 2), np.int64))  #: (E, 2) all members
     own_normals: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))  #: (V, 3) unit normals of the nodes
-    own_groups: tuple[str, ...] = ()  #: (E,) the layer or webs that each member belongs to
+    own_groups: tuple[str, ...] = ()  #: (E,) the layer or webs that each member belongs to, where there are layers
     layers: Layers | None = None
 
     @cached_property
@@ -36,6 +38,19 @@ class LayeredGrid(Grid):
         return np.where(number < len(self.own_members), number, -1)
 
     def is_chord(self) -> np.ndarray:
-        """Return whether each member (E,) lies in a layer and is no web."""
-        names = () if self.layers is None else self.layers.names
-        return np.array([group in names for group in self.own_groups], bool)
+        """Return whether each member (E,) is no web between layers."""
+        if self.layers is None:
+            return np.ones(len(self.own_members), bool)
+        return np.array([group in self.layers.names for group in self.own_groups], bool)
+
+
+def outer_normals(grid: Grid) -> np.ndarray:
+    """Return the unit normal of each node (V, 3); up where it has none."""
+    if isinstance(grid, Framework):
+        return grid.own_normals
+    a, b, c = grid.nodes[grid.triangles].transpose(1, 0, 2)
+    total = np.zeros((len(grid.nodes), 3))
+    for corner in grid.triangles.T:
+        np.add.at(total, corner, np.cross(b - a, c - a))
+    length = np.linalg.norm(total, axis=1, keepdims=True)
+    return np.where(length > 0, total / np.where(length > 0, length, 1.0), NO_PANELS_NORMAL)
