@@ -1,9 +1,10 @@
-"""Make the pictures of docs/formats-output.md: files of the court of example 8, opened and drawn by libraries that are not ours.
+"""Make the pictures of docs/formats-output.md: files of the court of example 8, opened and drawn by programs that are not ours.
 
-python scripts/make_format_pictures.py
+python scripts/make_format_pictures.py; needs LibreOffice Calc (soffice) and pdftoppm.
 """
 
 import runpy
+import subprocess
 import sys
 import tempfile
 from pathlib import Path
@@ -14,8 +15,10 @@ import ifcopenshell
 import ifcopenshell.geom
 import matplotlib
 import numpy as np
+import openpyxl
 from ezdxf.addons.drawing import matplotlib as dxf_drawing
-from PIL import Image
+from openpyxl.worksheet.properties import PageSetupProperties
+from PIL import Image, ImageOps
 
 import scantruss as st
 
@@ -42,7 +45,9 @@ def main() -> None:
             drawing.modelspace(), str(place / "dxf.png"), bg="#FFFFFF", fg="#000000", dpi=150, size_inches=(7, 5)
         )
         draw_ifc_bodies(place / "roof.ifc", place / "ifc.png")
-        for name in ("dxf", "ifc"):
+        st.write(truss, place / "roof.saf.xlsx")
+        draw_saf_members(place / "roof.saf.xlsx", place / "saf.png")
+        for name in ("dxf", "ifc", "saf"):
             with Image.open(place / f"{name}.png") as image:
                 small = image.convert("RGB").quantize(64, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
                 small.save(FORMAT_PICTURES / f"{name}.png", optimize=True)
@@ -81,6 +86,34 @@ def draw_ifc_bodies(path: Path, picture: Path) -> None:
     axes.set_axis_off()
     figure.subplots_adjust(0, 0, 1, 1)
     figure.savefig(picture)
+
+
+def draw_saf_members(path: Path, picture: Path) -> None:
+    """Print the sheet of the members by LibreOffice; openpyxl leaves its first rows and what is not empty, a page wide."""
+    book = openpyxl.load_workbook(path)
+    for name in book.sheetnames:
+        if name != "StructuralCurveMember":
+            del book[name]
+    sheet = book.active
+    sheet.delete_rows(22, sheet.max_row)
+    for column in sheet.iter_cols():
+        if column[0].value == "Id" or not any(cell.value for cell in column[1:]):
+            sheet.column_dimensions[column[0].column_letter].hidden = True
+    sheet.print_options.gridLines = True
+    sheet.page_setup.orientation, sheet.page_setup.fitToHeight = "landscape", 0
+    sheet.sheet_properties.pageSetUpPr = PageSetupProperties(fitToPage=True)
+    book.save(path)
+    subprocess.run(
+        ["soffice", "--headless", "--convert-to", "pdf", "--outdir", str(path.parent), str(path)], check=True
+    )
+    pages = path.with_name(f"{path.stem}.pdf")
+    subprocess.run(
+        ["pdftoppm", "-r", "220", "-png", "-singlefile", str(pages), str(picture.with_suffix(""))], check=True
+    )
+    with Image.open(picture) as page:
+        lit = ImageOps.invert(page.convert("L")).crop((0, 150, page.width, page.height - 150)).getbbox()
+        assert lit is not None
+        page.crop((lit[0], lit[1] + 150, lit[2], lit[3] + 150)).save(picture)
 
 
 if __name__ == "__main__":
