@@ -286,3 +286,18 @@ def test_a_length_out_of_range_is_refused_with_the_nearest_that_passes(
         named = float(said.split("a grid passes with --length ")[1].split()[0])
         assert low <= named <= high and abs(np.log(named / side)) < np.log(1.5)
         assert main(["grid", "limpet.xyz", "a.json", "--effort", "quick", "--length", str(named)]) == 0
+
+
+def test_where_no_length_passes_those_tried_are_named_and_not_tried_again(
+    place: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = counted_runs(monkeypatch, lambda length: False)
+    Advice(cloud_of("limpet"), st.Settings(length=1.0)).suggest()
+    for_advice = list(made)
+    made.clear()
+    assert main(["grid", "limpet.xyz", "a.json", "--effort", "quick"]) == 2
+    said = capsys.readouterr().err
+    assert "at which no quick run passes" in said
+    assert f"no grid passes with the lengths tried, {min(for_advice):g} to {max(for_advice):g}, either" in said
+    later = made[len(for_advice) :]
+    assert made[: len(for_advice)] == for_advice and len(set(later)) == 1  # the grid itself, at the usual length

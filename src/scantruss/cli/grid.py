@@ -29,6 +29,7 @@ from .shared import (
 
 if TYPE_CHECKING:
     from ..grid.grid import Grid
+    from ..report.advice import Advice
     from ..report.terminal import Bars
     from ..scan.cloud import PointCloud
     from ..settings import Settings
@@ -108,10 +109,13 @@ def grid(values: Namespace) -> None:
         for out in outs:
             check_unit(out, cloud.unit)
         spent = perf_counter() - started
+        advice = None
         if not has_length(values):
-            settings = choose_length(cloud, settings, bars)
+            settings, advice = choose_length(cloud, settings, bars)
         try:
-            result = grid_with_notes(cloud, settings, bars, keep_failed=values.keep_failed, read_seconds=spent)
+            result = grid_with_notes(
+                cloud, settings, bars, keep_failed=values.keep_failed, read_seconds=spent, advice=advice
+            )
         except FrontError as error:
             draw_refusal(error, cloud, outs, style, bars, force=values.force)
             raise
@@ -163,20 +167,26 @@ def check_outputs(values: Namespace, outs: list[Path], settings_file: Path, repo
 
 
 def grid_with_notes(
-    cloud: PointCloud, settings: Settings, bars: Bars, *, keep_failed: bool = False, read_seconds: float = 0.0
+    cloud: PointCloud,
+    settings: Settings,
+    bars: Bars,
+    *,
+    keep_failed: bool = False,
+    read_seconds: float = 0.0,
+    advice: Advice | None = None,
 ) -> Grid:
-    """Run the chain, with a note if kernels must be compiled."""
+    """Run the chain, with a note if kernels must be compiled; `advice` is what the length was chosen by."""
     from ..pipeline import grid_from_cloud
 
     with note_compiling(bars):
         try:
             grid = grid_from_cloud(cloud, settings, progress=bars, keep_failed=keep_failed, read_seconds=read_seconds)
         except LengthError as error:
-            raise LengthError(f"{error}{nearby_words(bars, cloud, settings)}") from None
+            raise LengthError(f"{error}{nearby_words(bars, cloud, settings, advice)}") from None
         except FrontError as error:
             note_layers(bars, cloud, settings)
             note_pieces(bars, cloud, settings)
-            words = f"{error}{nearby_words(bars, cloud, settings)}"
+            words = f"{error}{nearby_words(bars, cloud, settings, advice)}"
             raise type(error)(words, error.grid, error.where) from None
     made = grid.settings or settings
     smoothed = made.smooth_scale != settings.smooth_scale
@@ -225,25 +235,30 @@ def note_smoothed(bars: Bars, grid: Grid) -> None:
     )
 
 
-def choose_length(cloud: PointCloud, settings: Settings, bars: Bars) -> Settings:
-    """Return the settings with the length that `info` suggests, with a note."""
+def choose_length(cloud: PointCloud, settings: Settings, bars: Bars) -> tuple[Settings, Advice]:
+    """Return the settings with the length that `info` suggests, with a note, and what was tried for it."""
     from ..report.advice import Advice
 
     with note_compiling(bars):
-        length = Advice(cloud, settings, bars).suggest()
-    bars.note(
-        f"no --length is given; using {length:g}{f' {cloud.unit}' if cloud.unit else ''}, as scantruss info suggests"
+        advice = Advice(cloud, settings, bars)
+        length = advice.suggest()
+    passes = (
+        "as scantruss info suggests" if advice.passes else "at which no quick run passes, nor at others that were tried"
     )
-    return settings.replace(length=length)
+    bars.note(f"no --length is given; using {length:g}{f' {cloud.unit}' if cloud.unit else ''}, {passes}")
+    return settings.replace(length=length), advice
 
 
-def nearby_words(bars: Bars, cloud: PointCloud, settings: Settings) -> str:
+def nearby_words(bars: Bars, cloud: PointCloud, settings: Settings, advice: Advice | None = None) -> str:
     """Name the nearest length at which a grid passes, tried by quick runs; nothing if lengths vary over the scan."""
     from ..report.advice import Advice
 
     if settings.length_field:
         return ""
     unit = f" {cloud.unit}" if cloud.unit else ""
+    if advice is not None and advice.tried and not advice.passes:
+        lengths = f"{advice.tried[0].length:g} to {advice.tried[-1].length:g}{unit}"
+        return f"; no grid passes with the lengths tried, {lengths}, either: clean or crop the scan where it fails"
     if (length := Advice(cloud, settings, bars).nearby(settings.length)) is not None:
         return f"; a grid passes with --length {length:g} ({f'{cloud.unit}, ' if cloud.unit else ''}tried with --effort quick)"
     return f"; no grid passes with the lengths tried near {settings.length:g}{unit} either: clean or crop the scan where it fails"

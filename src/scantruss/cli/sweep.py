@@ -93,7 +93,7 @@ def sweep(values: Namespace) -> None:
         fitting = settings_to_read(values, shortest, bars)
         cloud = read_scan(values.scan, fitting, bars)
         if not has_length(values):
-            length = choose_length(cloud, shortest, bars).length
+            length = choose_length(cloud, shortest, bars)[0].length
             trials = [replace(trial, settings=trial.settings.replace(length=length)) for trial in trials]
         if variants:
             from ..structure.build import scale_of

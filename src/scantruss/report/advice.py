@@ -187,6 +187,11 @@ class Advice:
         """What came of the lengths that were tried, the shortest first."""
         return [self._found[length] for length in sorted(self._found)]
 
+    @property
+    def passes(self) -> bool:
+        """Whether a grid passes at any length that was tried."""
+        return any(trial.passed for trial in self._found.values())
+
     def suggest(self) -> float:
         """Return the length to take.
 
@@ -199,7 +204,7 @@ class Advice:
         both: dict[float, float] = {}  # length -> what is lost there or at the next above
         for share, most in self._ladder():
             length = min(max(_two_digits(share * self._usual), low), high)
-            if most > A_FEW and self._loses_limbs() and any(trial.passed for trial in self.tried):
+            if most > A_FEW and self._loses_limbs() and self.passes:
                 break  # a shorter length than the usual one keeps them, which more grids seldom do
             if any(trial.loses_limbs and trial.length < length for trial in self.tried):
                 continue
