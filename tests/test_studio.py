@@ -1,5 +1,6 @@
 """The studio without a browser: session, worker, project file."""
 
+import asyncio
 import threading
 import time
 from functools import partial
@@ -11,6 +12,7 @@ import pytest
 import scantruss as st
 from scantruss.pipeline import grid_from_cloud
 from scantruss.runtime.progress import Progress
+from scantruss.studio.in_order import InOrder
 from scantruss.studio.project import read_project
 from scantruss.studio.session import Session
 from scantruss.studio.worker import Worker
@@ -219,3 +221,38 @@ def test_a_damaged_project_is_refused_in_one_line(content: bytes, tmp_path: Path
         read_project(path)
     with pytest.raises(st.FormatError, match="cannot read"):
         read_project(tmp_path / "none.scantruss")
+
+
+def test_what_a_pointer_does_is_taken_in_its_order() -> None:
+    in_order, taken, last = InOrder(), list[int](), threading.Event()
+
+    def take(number: int) -> None:
+        time.sleep(0.05 if number == 0 else 0.0)  # the first takes longest
+        taken.append(number)
+        if number == 9:
+            last.set()
+
+    call = in_order(take)
+
+    async def events() -> None:
+        for number in range(10):
+            await call(number)
+
+    asyncio.run(events())
+    assert last.wait(PATIENCE) and taken == list(range(10))
+    in_order.close()
+
+
+def test_an_event_that_fails_keeps_none_from_being_taken(capsys: pytest.CaptureFixture[str]) -> None:
+    in_order, taken = InOrder(), threading.Event()
+
+    def fails(_: object) -> None:
+        raise ZeroDivisionError
+
+    async def events() -> None:
+        await in_order(fails)(None)
+        await in_order(lambda _: taken.set())(None)
+
+    asyncio.run(events())
+    assert taken.wait(PATIENCE) and "ZeroDivisionError" in capsys.readouterr().err
+    in_order.close()

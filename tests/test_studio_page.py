@@ -358,6 +358,25 @@ def test_a_server_that_is_killed_loses_nothing_but_what_it_was_at(tmp_path: Path
         kill(process)
 
 
+def test_a_click_on_what_is_said_on_the_drawing_reaches_the_drawing(served: tuple[str, Session]) -> None:
+    address, session = served
+    with open_page(address) as (page, errors):
+        page.wait_for_selector("text=Generate")
+        assert session.worker.wait(60)
+        page.click("text=Crop >> nth=0")
+        page.click("button:has-text('Polygon')")
+        said = page.locator("[role=alert]:has-text('click the corners')")
+        said.wait_for()
+        page.wait_for_timeout(500)
+        box = said.bounding_box()
+        covered = (box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
+        for place in ((500, 300), (400, 500), covered):
+            page.mouse.click(*place)
+            page.wait_for_timeout(400)
+        assert until(lambda: len(field(page, "crop").input_value().split(",")) == 6), "three corners of two coordinates"
+        assert errors == []
+
+
 def test_two_browsers_have_a_project_each(served: tuple[str, Session]) -> None:
     address, session = served
     with open_page(address) as (page, errors):

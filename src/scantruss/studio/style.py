@@ -1,4 +1,7 @@
-"""Colours of the panel: those of viser, but dark or light enough to be read (WCAG 2.1 AA, 4.5 to 1)."""
+"""Style of the page: that of viser, but with colours dark or light enough to be read (WCAG 2.1 AA, 4.5 to 1).
+
+What is said on the drawing lets the pointer through, for a click on it means what lies under it; its cross closes it.
+"""
 
 from __future__ import annotations
 
@@ -14,6 +17,8 @@ PANEL_STYLE = """<style>
   :is(.multi-slider-mark-label, .mantine-Slider-markLabel, .mantine-Notification-description) { color: #545b62 !important }
 [data-mantine-color-scheme="dark"]
   :is(.multi-slider-mark-label, .mantine-Slider-markLabel, .mantine-Notification-description) { color: #b4bac0 !important }
+.mantine-Notification-root { pointer-events: none !important }
+.mantine-Notification-closeButton { pointer-events: auto }
 pre { white-space: pre-wrap !important; overflow-wrap: anywhere }
 .mantine-ScrollArea-viewport { overflow-x: hidden !important }
 .mantine-ScrollArea-scrollbar[data-orientation="horizontal"] { display: none }

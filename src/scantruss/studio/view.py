@@ -17,6 +17,7 @@ from ..export.page_tables import Tables, tables_of
 from ..structure.build import scale_of
 from .colours import colorings_of_scan
 from .frame import BESIDE_FIRST, DRAWN_EXTENT, ROOM_AROUND, SceneFrame, distance_to_see
+from .in_order import InOrder
 from .legends import Legends
 from .outputs import model_to_show
 from .picking import NEAR_ENOUGH, pick
@@ -58,7 +59,7 @@ class StudioView:
         self.scene = Scene(client.scene)
         whole = float(client.camera.image_width or USUAL_WIDTH)
         self._width = max(whole - PANEL_WIDTH, 0.5 * whole)  # of the drawing once the panel is beside it [pixel]
-        self._lock = RLock()
+        self._lock, self.in_order = RLock(), InOrder()
         self._typed: dict[Callable[[], None], Timer] = {}  # steps of what was typed, which wait for more
         self._typing = RLock()
         self._shown: StudioState | None = None
@@ -105,7 +106,7 @@ class StudioView:
             self.steps.on_click(self.step(lambda: self._step(self.steps.value)))
             self._add_keys(gui)
         self.tabs = (self.design, self.constraints, self.structure, self.look, self.scan, self.compare, self.files)
-        client.scene.on_click()(self._clicked)
+        client.scene.on_click()(self.in_order(self._clicked))
         self._end = session.listen(self.update)
         self.update()
 
@@ -117,6 +118,7 @@ class StudioView:
     def close(self) -> None:
         """Stop listening to the session."""
         self._end()
+        self.in_order.close()
 
     # ---- controls
 
