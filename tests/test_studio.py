@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import scantruss as st
+from scantruss.cli.main import main
 from scantruss.pipeline import grid_from_cloud
 from scantruss.runtime.progress import Progress
 from scantruss.studio.in_order import InOrder
@@ -115,6 +116,21 @@ def test_an_upload_is_read_under_its_own_name_and_a_bad_one_is_refused(scan: Pat
     session.open_upload("no.xyz", b"no numbers")
     assert session.worker.wait(PATIENCE)
     assert "no.xyz" in session.message and session.cloud.name == "dome.xyz"
+
+
+@pytest.mark.parametrize("content", [b"", b"1 2 3\n", b"no numbers"])
+def test_what_is_refused_of_a_scan_is_said_as_the_command_line_does(
+    content: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "no.xyz").write_bytes(content)
+    monkeypatch.chdir(tmp_path)
+    assert main(["info", "no.xyz"]) == 2
+    words = capsys.readouterr().err.removeprefix("scantruss: ").strip()
+    uploaded, named = Session(), Session(folder=tmp_path)
+    uploaded.open_upload("no.xyz", content)
+    named.open_path("no.xyz")
+    for session in (uploaded, named):
+        assert session.worker.wait(PATIENCE) and session.message == words
 
 
 @pytest.mark.parametrize("words", ["own.csv", "own.csv:A", "loads.toml", "/etc/passwd"])

@@ -22,6 +22,7 @@ import scantruss as st
 from scantruss.cli.main import main
 from scantruss.studio.browsers import Browsers
 from scantruss.studio.colours import colors_of
+from scantruss.studio.scan_steps import LARGEST_UPLOAD, TOO_LARGE
 from scantruss.studio.server import PAGE_SCRIPT, Guard, serve_browsers, start_server
 from scantruss.studio.session import Session
 
@@ -374,6 +375,23 @@ def test_a_click_on_what_is_said_on_the_drawing_reaches_the_drawing(served: tupl
             page.mouse.click(*place)
             page.wait_for_timeout(400)
         assert until(lambda: len(field(page, "crop").input_value().split(",")) == 6), "three corners of two coordinates"
+        assert errors == []
+
+
+def test_a_file_that_is_too_large_is_not_sent(served: tuple[str, Session], tmp_path: Path) -> None:
+    address, session = served
+    for name, rows in (("large.xyz", 900), ("small.xyz", 400)):
+        np.savetxt(tmp_path / name, np.stack([*np.divmod(np.arange(rows), 20), np.zeros(rows)], axis=1), "%.1f")
+    with open_page(address) as (page, errors):
+        page.wait_for_selector("text=Generate")
+        words = page.locator("[data-largest]")
+        assert words.get_attribute("data-largest") == str(LARGEST_UPLOAD) and not words.is_visible()
+        page.evaluate("document.querySelector('[data-largest]').dataset.largest = 10000")
+        page.set_input_files("input[type=file]", tmp_path / "large.xyz")
+        page.wait_for_selector(f"text={TOO_LARGE}")
+        page.set_input_files("input[type=file]", tmp_path / "small.xyz")
+        page.wait_for_selector("text=400 points")
+        assert not words.is_visible() and session.history.words[0] == "open small.xyz"
         assert errors == []
 
 

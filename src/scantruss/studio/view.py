@@ -21,6 +21,7 @@ from .in_order import InOrder
 from .legends import Legends
 from .outputs import model_to_show
 from .picking import NEAR_ENOUGH, pick
+from .scan_steps import LARGEST_UPLOAD, TOO_LARGE
 from .scene import FIRST_POINTS, Scene
 from .session import Session
 from .state import StudioState
@@ -78,6 +79,7 @@ class StudioView:
             gui.configure_theme(show_share_button=False, show_logo=False, control_width="large")
             gui.add_html(PANEL_STYLE)
             self.message = gui.add_markdown("")
+            gui.add_html(words_of_large_upload())
             self.progress = gui.add_progress_bar(0.0, visible=False)
             generate = gui.add_button("Generate", color="blue", hint="with the effort that Design says (Ctrl+Enter)")
             self.steps = gui.add_button_group(
@@ -338,3 +340,8 @@ class StudioView:
                 tab.fill(before, state)
             if state.cloud is not None and (before is None or before.cloud is not state.cloud):
                 self.overview()
+
+
+def words_of_large_upload() -> str:
+    """Return what the page says of a file that is larger than it sends; hidden until one is chosen (`page_script.js`)."""
+    return f'<p hidden role="alert" data-largest="{LARGEST_UPLOAD}" style="padding:0 .6em"><b>Refused:</b> {TOO_LARGE}</p>'
