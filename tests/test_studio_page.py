@@ -10,6 +10,7 @@ import urllib.request
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 import numpy as np
 import openpyxl
@@ -23,7 +24,7 @@ from scantruss.cli.main import main
 from scantruss.studio.browsers import Browsers
 from scantruss.studio.colours import colors_of
 from scantruss.studio.scan_steps import LARGEST_UPLOAD, TOO_LARGE
-from scantruss.studio.server import PAGE_SCRIPT, Guard, serve_browsers, start_server
+from scantruss.studio.server import PAGE_SCRIPT, Guard, address_to_open, serve_browsers, start_server
 from scantruss.studio.session import Session
 
 
@@ -99,6 +100,15 @@ def test_beyond_this_machine_a_token_is_asked_for() -> None:
     assert guard.refusal("/", head | {"Cookie": f"scantruss_studio={guard.token}"}) == ""
     assert "other sites" in guard.refusal(f"/?token={guard.token}", head | {"Origin": "http://evil.example"})
     assert len(guard.token) > 20 and Guard("0.0.0.0").token != guard.token
+
+
+def test_the_address_that_is_printed_can_be_opened() -> None:
+    assert address_to_open("127.0.0.1", 80, "") == "http://localhost:80/"
+    assert address_to_open("office", 80, "abc") == "http://office:80/?token=abc"
+    assert address_to_open("fd00::1", 80, "abc") == "http://[fd00::1]:80/?token=abc"
+    for everywhere in ("0.0.0.0", "::"):
+        assert f"//{everywhere}:" not in (given := address_to_open(everywhere, 80, "abc")) and "[::]" not in given
+        assert urlsplit(given).hostname and given.endswith(":80/?token=abc")
 
 
 def test_a_port_that_is_taken_is_refused() -> None:

@@ -6,6 +6,7 @@ import gzip
 import hmac
 import http
 import secrets
+import socket
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from http.cookies import CookieError, SimpleCookie
@@ -20,6 +21,10 @@ if TYPE_CHECKING:
     from .browsers import Browsers
 
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
+SOMEWHERE = {
+    "0.0.0.0": "192.0.2.1",
+    "::": "2001:db8::1",
+}  #: addresses of examples (RFC 5737, 3849), by what listens everywhere
 COOKIE = "scantruss_studio"
 BROWSER_KEY = "scantruss_browser"
 PAGE_SCRIPT = Path(__file__).with_name("page_script.js")
@@ -165,8 +170,6 @@ def start_server(host: str, port: int) -> tuple[Any, Guard]:
         viser is not installed, or nothing can be served there.
     """
     check_viser()
-    import socket
-
     import viser
 
     with socket.socket(
@@ -185,6 +188,27 @@ def start_server(host: str, port: int) -> tuple[Any, Guard]:
         server = viser.ViserServer(host=host, port=port, label="ScanTruss studio", verbose=False)
     server.request_share_url = _no_tunnel  # a page could else ask for a way in from the network
     return server, guard
+
+
+def address_to_open(host: str, port: int, token: str) -> str:
+    """Return the address at which a browser finds the studio: where it listens to all of this machine's, the one that others reach."""
+    if host in LOOPBACK:
+        host = "localhost"
+    elif host in SOMEWHERE:
+        host = _own_address(host)
+    shown = f"[{host}]" if ":" in host else host
+    return f"http://{shown}:{port}/" + (f"?token={token}" if token else "")
+
+
+def _own_address(everywhere: str) -> str:
+    """Return the address of this machine in its network; its name where it is in none."""
+    family = socket.AF_INET6 if ":" in everywhere else socket.AF_INET
+    with socket.socket(family, socket.SOCK_DGRAM) as trial:
+        try:
+            trial.connect((SOMEWHERE[everywhere], 9))  # of datagrams: nothing is sent
+            return str(trial.getsockname()[0])
+        except OSError:
+            return socket.gethostname()
 
 
 def serve_browsers(server: Any, browsers: Browsers) -> None:

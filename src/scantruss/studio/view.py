@@ -344,4 +344,6 @@ class StudioView:
 
 def words_of_large_upload() -> str:
     """Return what the page says of a file that is larger than it sends; hidden until one is chosen (`page_script.js`)."""
-    return f'<p hidden role="alert" data-largest="{LARGEST_UPLOAD}" style="padding:0 .6em"><b>Refused:</b> {TOO_LARGE}</p>'
+    return (
+        f'<p hidden role="alert" data-largest="{LARGEST_UPLOAD}" style="padding:0 .6em"><b>Refused:</b> {TOO_LARGE}</p>'
+    )
