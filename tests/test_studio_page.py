@@ -24,7 +24,7 @@ from scantruss.cli.main import main
 from scantruss.studio.browsers import Browsers
 from scantruss.studio.colours import colors_of
 from scantruss.studio.scan_steps import LARGEST_UPLOAD, TOO_LARGE
-from scantruss.studio.server import PAGE_SCRIPT, Guard, address_to_open, serve_browsers, start_server
+from scantruss.studio.server import PAGE_SCRIPTS, Guard, address_to_open, serve_browsers, start_server
 from scantruss.studio.session import Session
 
 
@@ -73,7 +73,8 @@ def test_only_our_own_page_is_served(served: tuple[str, Session]) -> None:
     with urllib.request.urlopen(address, timeout=10) as answer:
         assert answer.headers["X-Frame-Options"] == "DENY"  # no other page shows it within itself
         page = answer.read()
-        assert int(answer.headers["Content-Length"]) == len(page) and PAGE_SCRIPT.read_bytes() in page
+        assert int(answer.headers["Content-Length"]) == len(page)
+        assert all(each.read_bytes() in page for each in PAGE_SCRIPTS)
 
 
 @pytest.mark.parametrize(
@@ -402,6 +403,62 @@ def test_a_file_that_is_too_large_is_not_sent(served: tuple[str, Session], tmp_p
         page.set_input_files("input[type=file]", tmp_path / "small.xyz")
         page.wait_for_selector("text=400 points")
         assert not words.is_visible() and session.history.words[0] == "open small.xyz"
+        assert errors == []
+
+
+UNREACHED = """() => {  // controls that are seen and that the Tab key has not been on, or on which nothing showed that it was
+  const all = `button:not([tabindex='-1']), input, [role=slider], [role=tab], canvas[data-engine],
+    [data-with-border] > .mantine-Paper-root:first-child`;
+  return [...document.querySelectorAll(all)].filter((e) => e.checkVisibility() && !e.disabled && !seen.has(e))
+    .map((e) => e.getAttribute("aria-label") || e.textContent || e.outerHTML.slice(0, 150));
+}"""
+NOTE_FOCUS = """() => {
+  const e = document.activeElement, style = getComputedStyle(e);
+  const isNamed = e.getAttribute("aria-label") || e.labels?.length || e.textContent.trim();
+  if (isNamed && style.outlineStyle === "solid" && parseFloat(style.outlineWidth) >= 2) seen.add(e);
+  return e === document.body;
+}"""
+
+
+def test_keys_alone_reach_everything(served: tuple[str, Session]) -> None:
+    address, session = served
+    with open_page(address) as (page, errors):
+        page.wait_for_selector("text=Generate")
+        assert session.worker.wait(60)
+        page.evaluate("() => { window.seen = new Set(); }")
+        for name in ("Scan", "Design", "Constraints", "Grid", "Compare", "Structure", "Out"):
+            page.focus(f"[role=tab]:has-text('{name}')")
+            page.keyboard.press("Enter")
+            for head in page.locator("[data-with-border] > [aria-expanded=false]:visible").all()[::-1]:
+                head.focus()
+                page.keyboard.press("Enter")
+            page.wait_for_timeout(400)
+            assert page.locator("[data-with-border] > [aria-expanded=false]:visible").count() == 0
+            for _ in range(2):  # from where it is to the end, and all around
+                for _ in range(200):
+                    page.keyboard.press("Tab")
+                    if page.evaluate(NOTE_FOCUS):
+                        break
+            assert page.evaluate(UNREACHED) == [], name
+        tab(page, "Constraints")
+        page.focus("button:has-text('Place by clicks')")
+        page.keyboard.press("Enter")
+        page.wait_for_selector("input[value='place fixed node']")
+        while (
+            page.evaluate("document.activeElement.tagName") != "CANVAS"
+        ):  # ends: it is in the ring that Tab goes around, as was seen
+            page.keyboard.press("Shift+Tab")
+        page.keyboard.press("Enter")  # the cross begins in the middle of the drawing, where the dome is
+        assert until(lambda: len(session.settings.fixed) == 1) and session.worker.wait(60)
+        (place,) = session.settings.fixed
+        page.wait_for_timeout(500)
+        page.keyboard.press(" ")
+        for _ in range(5):
+            page.keyboard.press("ArrowRight")
+            page.wait_for_timeout(50)
+        page.keyboard.press(" ")
+        assert until(lambda: session.settings.fixed != (place,))
+        assert len(session.settings.fixed) == 1 and session.settings.fixed[0][0] > place[0]
         assert errors == []
 
 

@@ -27,7 +27,7 @@ SOMEWHERE = {
 }  #: addresses of examples (RFC 5737, 3849), by what listens everywhere
 COOKIE = "scantruss_studio"
 BROWSER_KEY = "scantruss_browser"
-PAGE_SCRIPT = Path(__file__).with_name("page_script.js")
+PAGE_SCRIPTS = tuple(Path(__file__).with_name(name) for name in ("page_script.js", "page_keys.js"))
 STORAGE_PATIENCE = 5.0  #: how long a browser may take to say who it is [s]
 Handler = Callable[[Any, Any], Any]
 
@@ -80,11 +80,12 @@ class Guard:
         return ""
 
     def _add_script(self, answer: Any) -> None:
-        """Give a page our own script; pages that were served before are remembered."""
+        """Give a page our own scripts; pages that were served before are remembered."""
         is_packed = answer.headers.get("Content-Encoding") == "gzip"
         if (kept := self._pages.get(is_packed)) is None or kept[0] != answer.body:
             page = gzip.decompress(answer.body) if is_packed else answer.body
-            page = page.replace(b"<head>", b"<head><script>{" + PAGE_SCRIPT.read_bytes() + b"}</script>", 1)
+            scripts = b"".join(b"<script>{" + each.read_bytes() + b"}</script>" for each in PAGE_SCRIPTS)
+            page = page.replace(b"<head>", b"<head>" + scripts, 1)
             kept = self._pages[is_packed] = (answer.body, gzip.compress(page) if is_packed else page)
         answer.body = kept[1]
         del answer.headers["Content-Length"]

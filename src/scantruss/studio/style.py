@@ -17,6 +17,9 @@ PANEL_STYLE = """<style>
   :is(.multi-slider-mark-label, .mantine-Slider-markLabel, .mantine-Notification-description) { color: #545b62 !important }
 [data-mantine-color-scheme="dark"]
   :is(.multi-slider-mark-label, .mantine-Slider-markLabel, .mantine-Notification-description) { color: #b4bac0 !important }
+:is(input, textarea, canvas, [data-with-border] > [role="button"]):focus-visible {
+  outline: 2px solid #1864ab !important; outline-offset: -2px }
+[data-mantine-color-scheme="dark"] :is(input, textarea, canvas, [role="button"]):focus-visible { outline-color: #8cc4f8 !important }
 .mantine-Notification-root { pointer-events: none !important }
 .mantine-Notification-closeButton { pointer-events: auto }
 pre { white-space: pre-wrap !important; overflow-wrap: anywhere }
