@@ -173,6 +173,13 @@ def shown_colors(page: Any) -> np.ndarray:
     return np.asarray(picture.convert("RGB")).reshape(-1, 3).astype(int)
 
 
+def is_orange(pixels: np.ndarray) -> np.ndarray:
+    """Return which pixels (N, 3) have the colour of a fixed node, in light or shade (N,)."""
+    red, green, blue = pixels.T
+    found: np.ndarray = (red > 150) & (green > 0.3 * red) & (green < 0.62 * red) & (blue < 0.25 * red)
+    return found
+
+
 def drag(page: Any, begin: tuple[float, float], end: tuple[float, float]) -> None:
     """Drag from one place of the page to another."""
     page.mouse.move(*begin)
@@ -451,7 +458,7 @@ def test_keys_alone_reach_everything(served: tuple[str, Session]) -> None:
         page.keyboard.press("Enter")  # the cross begins in the middle of the drawing, where the dome is
         assert until(lambda: len(session.settings.fixed) == 1) and session.worker.wait(60)
         (place,) = session.settings.fixed
-        page.wait_for_timeout(500)
+        assert until(lambda: bool(is_orange(shown_colors(page)).sum() > 10))  # its ball is drawn
         page.keyboard.press(" ")
         for _ in range(5):
             page.keyboard.press("ArrowRight")
