@@ -217,18 +217,21 @@ def downloaded(page: Any, kind: str, old: str, suffix: str, folder: Path) -> Pat
     return folder / f"{kind}{suffix}"
 
 
-FAINT = """() => {  // what is written with less contrast than 4.5 to 1 (WCAG 2.1, 1.4.3)
+FAINT = """() => {  // what is written with less contrast than 4.5 to 1 (WCAG 2.1, 1.4.3), and edges of controls with less than 3 (1.4.11)
   const light = (c) => { const f = c.map((v) => (v /= 255) <= 0.03928 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4);
     return 0.2126 * f[0] + 0.7152 * f[1] + 0.0722 * f[2]; };
   const parts = (s) => { const m = s.match(/[\\d.]+/g).map(Number); return m.length > 3 ? m : [...m, 1]; };
+  const behind = (e) => { for (let p = e; p; p = p.parentElement) {
+    const b = parts(getComputedStyle(p).backgroundColor); if (b[3] > 0.9) return b; } return [255, 255, 255]; };
+  const contrast = (...pair) => { const [a, b] = pair.map((c) => light(c.slice(0, 3)) + 0.05); return Math.max(a, b) / Math.min(a, b); };
   return [...document.querySelectorAll("body *")].filter((e) => {
-    const says = [...e.childNodes].some((n) => n.nodeType === 3 && n.textContent.trim())
-      || (e.tagName === "INPUT" && e.type === "text" && e.value);
-    if (!says || !e.getClientRects().length || e.tagName === "STYLE") return false;
-    let behind = [255, 255, 255, 1];
-    for (let p = e; p; p = p.parentElement) { const b = parts(getComputedStyle(p).backgroundColor); if (b[3] > 0.9) { behind = b; break; } }
-    const pair = [parts(getComputedStyle(e).color), behind].map((c) => light(c.slice(0, 3)) + 0.05);
-    return Math.max(...pair) / Math.min(...pair) < 4.5;
+    if (!e.getClientRects().length || e.tagName === "STYLE") return false;
+    const style = getComputedStyle(e), isInput = e.tagName === "INPUT";
+    const around = isInput ? behind(e.parentElement) : null;
+    const edges = [style.borderColor, style.backgroundColor].map(parts);
+    if (isInput && Math.max(...edges.map((edge) => contrast(edge, around))) < 3) return true;
+    const says = [...e.childNodes].some((n) => n.nodeType === 3 && n.textContent.trim()) || (isInput && e.type === "text" && e.value);
+    return says && contrast(parts(style.color), behind(e)) < 4.5;
   }).map((e) => `${e.className} ${e.textContent || e.value}`);
 }"""
 
@@ -466,6 +469,22 @@ def test_keys_alone_reach_everything(served: tuple[str, Session]) -> None:
         page.keyboard.press(" ")
         assert until(lambda: session.settings.fixed != (place,))
         assert len(session.settings.fixed) == 1 and session.settings.fixed[0][0] > place[0]
+        assert errors == []
+
+
+def test_a_tap_is_a_click(served: tuple[str, Session]) -> None:
+    address, _ = served
+    with open_page(address) as (page, errors):
+        tablet = page.context.browser.new_context(viewport={"width": 1024, "height": 768}, has_touch=True).new_page()
+        page.close()
+        tablet.goto(address)
+        tablet.wait_for_selector("text=Generate")
+        tablet.tap("[role=tab]:has-text('Constraints')")
+        tablet.tap("button:has-text('Place by clicks')")
+        tablet.wait_for_selector("input[value='place fixed node']")
+        tablet.wait_for_timeout(1000)
+        tablet.touchscreen.tap(284, 384)  # the middle of the drawing, where the dome is
+        tablet.wait_for_selector("text=undo: fixed node")
         assert errors == []
 
 

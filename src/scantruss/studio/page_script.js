@@ -21,6 +21,11 @@ addEventListener("change", (event) => {
   event.target.value = "";
 }, true);
 
+// A finger belongs to the drawing as soon as it is down, which viser takes for a handle that is being dragged: a tap would be no click.
+addEventListener("pointerdown", (event) => {
+  if (event.target.tagName === "CANVAS" && event.target.hasPointerCapture(event.pointerId)) event.target.releasePointerCapture(event.pointerId);
+}, true);
+
 // Keys that move a slider, the caret or a list turn the camera too, which listens further out: not while a control has them.
 addEventListener("DOMContentLoaded", () => document.body.addEventListener("keydown", (event) => {
   const plain = !event.ctrlKey && !event.metaKey && /^(Arrow.*|[a-zA-Z])$/.test(event.key);
