@@ -1,5 +1,4 @@
-"""Style of the page: that of viser, but with colours dark or light enough to be read (WCAG 2.1 AA: text 4.5 to 1, edges of
-controls 3 to 1).
+"""Style of the page: that of viser, but dark or light enough to be read (WCAG 2.1 AA: text 4.5 to 1, edges 3 to 1).
 
 What is said on the drawing lets the pointer through, for a click on it means what lies under it; its cross closes it.
 """
