@@ -24,7 +24,9 @@ from .steps import Steps
 
 LARGEST_UPLOAD = 500_000_000  #: of a scan that comes through the page [bytes]
 TOO_LARGE = f"a scan of more than {LARGEST_UPLOAD:,} bytes; name it on the command line: scantruss studio SCAN"
-NO_GRID: dict[str, Any] = {"grid": None, "asked": None, "is_live": False, "solution": None, "report": None}
+NO_GRID: dict[str, Any] = {
+    "grid": None, "trade": None, "asked": None, "is_live": False, "solution": None, "report": None
+}  # fmt: skip
 """Changes of a scan that is another now."""
 
 

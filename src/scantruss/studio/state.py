@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..grid.grid import Grid
+from ..layouts.trade import Traded
 from ..scan.cloud import PointCloud
 from ..settings import Settings
 from ..structure.options import StructureSettings
@@ -29,6 +30,20 @@ class Design:
 
 
 @dataclass(frozen=True, eq=False)
+class Trade:
+    """What the numbers of lengths or kinds of a grid cost."""
+
+    before: Grid
+    parts: str  #: of `scantruss.grid.alike`
+    traded: tuple[Traded, ...]  #: the most lengths or kinds first
+    off_scan: float  #: farthest node of the grid before off the scan, over its mean member
+
+    def with_at_most(self, number: int) -> Traded:
+        """Return the most lengths or kinds that are no more than a number; the fewest where all are more."""
+        return next((each for each in self.traded if each.number <= number), self.traded[-1])
+
+
+@dataclass(frozen=True, eq=False)
 class StudioState:
     """What a studio works on."""
 
@@ -37,6 +52,7 @@ class StudioState:
     settings: Settings = NO_LENGTH
     grid: Grid | None = None
     asked: Settings | None = None  #: with which the grid was asked for; its own say what was done to get it
+    trade: Trade | None = None  #: of the grid, or of the one that it was made of
     is_live: bool = False  #: whether the grid is a quick one, made while the length was chosen
     structure_settings: StructureSettings = DEFAULT_STRUCTURE
     solution: Solution | None = None

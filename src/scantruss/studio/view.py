@@ -42,7 +42,7 @@ NATURAL_VIEW = 0.65  #: of the camera, upright [rad]
 PLAN_VIEW = 0.08  #: the same of a plan, seen from so far that heights hardly matter [rad]
 PLAN_FAR = 1.3  #: of the camera above a plan, so that all of it is seen [distance at which it fills the view]
 PANEL_WIDTH, USUAL_WIDTH = 452, 1280  #: of the panel; of a page that has not said its own [pixel]
-LEAST_SHARE = 0.4  #: of a page that the drawing has beside the panel, which lies over it on narrower ones
+LEAST_DRAWING = 0.4  #: of a page that the drawing has beside the panel, which lies over it on narrower ones
 FIRST_SEEN_FROM = np.array([0.8, -1.4, 0.9])  #: direction from which the scan is seen first
 STEP_NAMES = ("Stop", "Undo", "Redo")
 SMALL_PICTURE, PICTURE_WAIT = (
@@ -61,7 +61,7 @@ class StudioView:
         self.scene = Scene(client.scene)
         whole = float(client.camera.image_width or USUAL_WIDTH)
         self._width = max(
-            whole - PANEL_WIDTH, LEAST_SHARE * whole
+            whole - PANEL_WIDTH, LEAST_DRAWING * whole
         )  # of the drawing once the panel is beside it [pixel]
         self._lock, self.in_order = RLock(), InOrder()
         self._typed: dict[Callable[[], None], Timer] = {}  # steps of what was typed, which wait for more
