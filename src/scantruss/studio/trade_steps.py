@@ -71,13 +71,15 @@ class TradeSteps(ScanSteps):
                     keep(traded, off)
                 return
 
-            def shared(stage: str, share: float) -> None:
+            def of_finding(stage: str, share: float) -> None:
                 progress(stage, FOUND_SHARE * share)
 
+            def of_trading(stage: str, share: float) -> None:
+                progress(stage, FOUND_SHARE + (1.0 - FOUND_SHARE) * share)
+
             few = few_joints if parts == JOINTS else few_panels
-            found = few(before, tolerance, mirrored=mirrored, progress=shared)
-            progress(parts, FOUND_SHARE)
-            keep(traded_kinds(before, found, scan.farthest_node), off)
+            found = few(before, tolerance, mirrored=mirrored, progress=of_finding)
+            keep(traded_kinds(before, found, scan.farthest_node, of_trading), off)
 
         self.worker.ask(look)
 
