@@ -28,7 +28,7 @@ from .state import Design, StudioState, Trade
 
 PROJECT_FORMAT, PROJECT_VERSION = "scantruss-project", 5
 CLEANING_OF_PART = 3  #: last version in which a cleaning named the points of the part that was taken
-PROJECT_PARTS = ("made_by.npy", "project.json", "scan.npz", "removed.npy", "by_hand.npy", "structure.toml", "grid.json",
+PROJECT_PARTS = ("made_by.npy", "project.json", "scan.npz", "removed.npy", "by_hand.npy", "structure.toml", "solved.toml", "grid.json",
                  "structure.json", TRADE_HEAD, TRADE_NODES, TRADE_BEFORE)  # fmt: skip
 FIXED_DATE = (1980, 1, 1, 0, 0, 0)  # the same project gives the same bytes
 Part = TypeVar("Part")
@@ -70,6 +70,7 @@ def save_project(path: Path, state: StudioState) -> None:
     if state.grid is not None:
         parts["grid.json"] = _kept(_GRIDS, state.grid, encode_json)
     if solved and state.solution is not None:
+        parts["solved.toml"] = settings_text(state.shown_structure).encode()
         parts["structure.json"] = _kept(
             _STRUCTURES, state.solution, lambda solution: encode_model(model_of(solution, report=state.report))
         )
@@ -175,6 +176,7 @@ def _project_of(parts: dict[str, bytes]) -> tuple[StudioState, bool]:
         trade=trade_of_parts(parts, grid, _grid_of),
         is_live=bool(head.get("quick", False)) and grid is not None,
         structure_settings=_structure_settings_of(parts["structure.toml"]),
+        solved_with=_structure_settings_of(parts["solved.toml"]) if "solved.toml" in parts else None,
         designs=tuple(
             Design(each["name"], _grid_of(parts[f"design-{k}.json"]), tuple((a, b) for a, b in each["figures"]))
             for k, each in enumerate(head.get("designs", ()), 1)

@@ -18,7 +18,7 @@ from ..settings import Settings
 from .opening import DATA_FOLDER, EXAMPLES, called, marks_of, next_free, read_whole
 from .project import read_project
 from .scan_parts import Cleaning, WholeScan, cleaning_of, part_of_scan
-from .solving import solved_state
+from .solving import solved_again
 from .state import StudioState
 from .steps import Steps
 
@@ -60,7 +60,7 @@ class ScanSteps(Steps):
         """
         if path.suffix.lower() == ".scantruss":
             state, solved = read_project(path)
-            self.begin(solved_state(state) if solved else state)
+            self.begin(solved_again(state) if solved else state)
             return
         cloud = read_whole(path)
         self._start(WholeScan(cloud, *marks_of(path, cloud)))
@@ -78,7 +78,7 @@ class ScanSteps(Steps):
                 if path.suffix.lower() == ".scantruss":
                     state, solved = read_project(path)
                     number, place = self._place_for(own)
-                    self._open_state(f"open {own}", solved_state(state) if solved else state, number, place)
+                    self._open_state(f"open {own}", solved_again(state) if solved else state, number, place)
                     return
                 cloud = read_whole(path)
                 classes, colors = marks_of(path, cloud)
@@ -110,7 +110,7 @@ class ScanSteps(Steps):
             if path.suffix.lower() == ".scantruss":
                 with called(name.strip(), path):
                     state, solved = read_project(path)
-                taken = solved_state(state) if solved else state
+                taken = solved_again(state) if solved else state
                 place = next_free(path, self.is_taken) if self.is_taken(path) else path
                 self._open_state(f"open {path.name}", taken, max(self._places) + 1, place)
                 return

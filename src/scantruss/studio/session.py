@@ -180,6 +180,7 @@ class Session(TradeSteps):
         settings = self.state.structure_settings.replace(**given)
         if settings != self.state.structure_settings:
             self.change("structure", structure_settings=settings)
+            self.save()
 
     def run_structure(self) -> None:
         """Make the structure of the grid and solve it."""
@@ -190,7 +191,7 @@ class Session(TradeSteps):
             solved = solved_state(self.state, progress)
             if turn != self._turn or solved.grid is not self.grid:
                 return
-            self.change("run", solution=solved.solution, report=solved.report)
+            self.change("run", solution=solved.solution, report=solved.report, solved_with=solved.solved_with)
             self.save()
 
         self.worker.ask(run, then=True)

@@ -56,6 +56,7 @@ class StudioState:
     is_live: bool = False  #: whether the grid is a quick one, made while the length was chosen
     structure_settings: StructureSettings = DEFAULT_STRUCTURE
     solution: Solution | None = None
+    solved_with: StructureSettings | None = None  #: with which it was solved
     report: StructureReport | None = None
     designs: tuple[Design, ...] = ()
     whole: WholeScan | None = None  #: as it was opened; `cloud` is what is taken of it
@@ -75,6 +76,16 @@ class StudioState:
         assert self.whole is not None
         all_of_it = self.settings.replace(crop=())
         return taken_of_scan(self.whole, all_of_it, self.cleaning, self.removed) & ~self.taken()
+
+    @property
+    def shown_structure(self) -> StructureSettings:
+        """Return the settings of the structure that is shown, of the next one where none is."""
+        return self.structure_settings if self.solution is None or self.solved_with is None else self.solved_with
+
+    @property
+    def is_structure_stale(self) -> bool:
+        """Whether settings have changed since the structure was solved."""
+        return self.solution is not None and self.shown_structure != self.structure_settings
 
     @property
     def is_stale(self) -> bool:

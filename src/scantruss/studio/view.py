@@ -278,7 +278,7 @@ class StudioView:
     def metres(self) -> float:
         """Return the metres of one scan unit in the structure."""
         state = self.session.state
-        asked = state.structure_settings
+        asked = state.shown_structure
         return scale_of(state.settings.unit or (state.cloud.unit if state.cloud else "") or asked.unit, asked.scale)
 
     def places(self, model: Model) -> np.ndarray:
@@ -328,6 +328,8 @@ class StudioView:
             words = f"**Refused:** {session.message}" if session.message else session.stage or "ready"
             if state.is_stale and not session.message and not session.stage:
                 words = "The grid was made before the last change: press **Generate**"
+            elif state.is_structure_stale and not session.message and not session.stage:
+                words = "The structure was solved before the last change: press **Run**"
             undo, redo = session.history.words
             taken = " · ".join(f"{way}: {what}" for way, what in (("undo", undo), ("redo", redo)) if what)
             self.message.content = words + (f"\n\n<small>{taken}</small>" if taken else "")
