@@ -472,6 +472,28 @@ def test_keys_alone_reach_everything(served: tuple[str, Session]) -> None:
         assert errors == []
 
 
+def test_what_goes_is_shown_within_the_scan(served: tuple[str, Session]) -> None:
+    address, session = served
+    with open_page(address) as (page, errors):
+        page.wait_for_selector("text=Generate")
+        assert until(lambda: session.grid is not None)
+        tab(page, "Grid")
+        for name in ("draw members", "draw panels"):
+            field(page, name).uncheck()
+
+        def drawn() -> int:
+            return int((shown_colors(page) != 255).any(axis=1).sum())
+
+        tab(page, "Scan")
+        assert not field(page, "draw scan").is_checked() and until(lambda: drawn() < 60_000)
+        empty = drawn()  # but for the legend and what the browser says
+        page.click("text=Clean >> nth=0")
+        page.click("button:has-text('Show what goes')")
+        page.wait_for_selector("text=of 3,600 points go")
+        assert field(page, "draw scan").is_checked() and until(lambda: drawn() > empty + 2000)
+        assert errors == []
+
+
 def test_a_tap_is_a_click(served: tuple[str, Session]) -> None:
     address, _ = served
     with open_page(address) as (page, errors):
