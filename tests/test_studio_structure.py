@@ -80,9 +80,10 @@ def test_what_was_asked_for_since_the_structure_was_solved_is_kept_beside_it(tmp
     session.run_structure()
     done(session)
     before, solution = session.state.structure_settings, session.solution
-    assert solution is not None and not session.state.is_structure_stale
+    assert solution is not None and session.state.is_structure_stale is False
     session.set_structure(supports="N001")  # with which it is a mechanism
-    assert session.state.is_structure_stale and session.state.shown_structure == before
+    state = session.state
+    assert state.is_structure_stale and state.shown_structure == before
     again = Session()
     again.open(tmp_path / "dome.scantruss")  # of a server that was killed then
     assert again.state.structure_settings.supports == "N001" and again.state.shown_structure == before
