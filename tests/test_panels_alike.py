@@ -56,6 +56,36 @@ def test_misfits_are_those_of_one_panel_laid_on_the_other(mirrored: bool) -> Non
 
 
 @pytest.mark.parametrize("make", [corners_of, stars_of])
+def test_misfits_in_blocks_are_those_at_once(
+    make: Callable[[st.Grid], PartVectors], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    grid = uneven(5)
+    parts = make(grid)
+    vectors, every = parts.vectors(grid.nodes), np.arange(len(parts.count))
+    at_once = parts.misfits(vectors, every, mirrored=True)
+    monkeypatch.setattr("scantruss.layouts.part_vectors.PAIRS_AT_ONCE", 3 * len(every))
+    heard: list[None] = []
+    in_blocks = parts.misfits(vectors, every, mirrored=True, heard=lambda: heard.append(None))
+    assert len(heard) == -(-len(every) // 3)
+    assert all(np.array_equal(*pair) for pair in zip(at_once, in_blocks, strict=True))
+
+
+@pytest.mark.parametrize("call", [2, 20])
+def test_a_trade_of_kinds_ends_where_its_progress_raises(call: int) -> None:
+    grid, heard = uneven(5), list[float]()
+    found = st.few_panels(grid, 0.02)
+
+    def stop(_: str, share: float) -> None:
+        heard.append(share)
+        if len(heard) == call:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        traded_kinds(grid, found, progress=stop)
+    assert len(heard) == call and heard == sorted(heard) and heard[-1] < 1.0
+
+
+@pytest.mark.parametrize("make", [corners_of, stars_of])
 def test_slopes_are_differences(make: Callable[[st.Grid], PartVectors]) -> None:
     grid = vault(3, uneven=0.2)
     parts = make(grid)

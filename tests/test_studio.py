@@ -1,5 +1,6 @@
 """The studio without a browser: session, worker, project file."""
 
+import asyncio
 import threading
 import time
 from functools import partial
@@ -9,8 +10,10 @@ import numpy as np
 import pytest
 
 import scantruss as st
+from scantruss.cli.main import main
 from scantruss.pipeline import grid_from_cloud
 from scantruss.runtime.progress import Progress
+from scantruss.studio.in_order import InOrder
 from scantruss.studio.project import read_project
 from scantruss.studio.session import Session
 from scantruss.studio.worker import Worker
@@ -113,6 +116,21 @@ def test_an_upload_is_read_under_its_own_name_and_a_bad_one_is_refused(scan: Pat
     session.open_upload("no.xyz", b"no numbers")
     assert session.worker.wait(PATIENCE)
     assert "no.xyz" in session.message and session.cloud.name == "dome.xyz"
+
+
+@pytest.mark.parametrize("content", [b"", b"1 2 3\n", b"no numbers"])
+def test_what_is_refused_of_a_scan_is_said_as_the_command_line_does(
+    content: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "no.xyz").write_bytes(content)
+    monkeypatch.chdir(tmp_path)
+    assert main(["info", "no.xyz"]) == 2
+    words = capsys.readouterr().err.removeprefix("scantruss: ").strip()
+    uploaded, named = Session(), Session(folder=tmp_path)
+    uploaded.open_upload("no.xyz", content)
+    named.open_path("no.xyz")
+    for session in (uploaded, named):
+        assert session.worker.wait(PATIENCE) and session.message == words
 
 
 @pytest.mark.parametrize("words", ["own.csv", "own.csv:A", "loads.toml", "/etc/passwd"])
@@ -219,3 +237,38 @@ def test_a_damaged_project_is_refused_in_one_line(content: bytes, tmp_path: Path
         read_project(path)
     with pytest.raises(st.FormatError, match="cannot read"):
         read_project(tmp_path / "none.scantruss")
+
+
+def test_what_a_pointer_does_is_taken_in_its_order() -> None:
+    in_order, taken, last = InOrder(), list[int](), threading.Event()
+
+    def take(number: int) -> None:
+        time.sleep(0.05 if number == 0 else 0.0)  # the first takes longest
+        taken.append(number)
+        if number == 9:
+            last.set()
+
+    call = in_order(take)
+
+    async def events() -> None:
+        for number in range(10):
+            await call(number)
+
+    asyncio.run(events())
+    assert last.wait(PATIENCE) and taken == list(range(10))
+    in_order.close()
+
+
+def test_an_event_that_fails_keeps_none_from_being_taken(capsys: pytest.CaptureFixture[str]) -> None:
+    in_order, taken = InOrder(), threading.Event()
+
+    def fails(_: object) -> None:
+        raise ZeroDivisionError
+
+    async def events() -> None:
+        await in_order(fails)(None)
+        await in_order(lambda _: taken.set())(None)
+
+    asyncio.run(events())
+    assert taken.wait(PATIENCE) and "ZeroDivisionError" in capsys.readouterr().err
+    in_order.close()

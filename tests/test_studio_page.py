@@ -10,6 +10,7 @@ import urllib.request
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 import numpy as np
 import openpyxl
@@ -22,7 +23,8 @@ import scantruss as st
 from scantruss.cli.main import main
 from scantruss.studio.browsers import Browsers
 from scantruss.studio.colours import colors_of
-from scantruss.studio.server import PAGE_SCRIPT, Guard, serve_browsers, start_server
+from scantruss.studio.scan_steps import LARGEST_UPLOAD, TOO_LARGE
+from scantruss.studio.server import PAGE_SCRIPTS, Guard, address_to_open, serve_browsers, start_server
 from scantruss.studio.session import Session
 
 
@@ -71,7 +73,8 @@ def test_only_our_own_page_is_served(served: tuple[str, Session]) -> None:
     with urllib.request.urlopen(address, timeout=10) as answer:
         assert answer.headers["X-Frame-Options"] == "DENY"  # no other page shows it within itself
         page = answer.read()
-        assert int(answer.headers["Content-Length"]) == len(page) and PAGE_SCRIPT.read_bytes() in page
+        assert int(answer.headers["Content-Length"]) == len(page)
+        assert all(each.read_bytes() in page for each in PAGE_SCRIPTS)
 
 
 @pytest.mark.parametrize(
@@ -98,6 +101,15 @@ def test_beyond_this_machine_a_token_is_asked_for() -> None:
     assert guard.refusal("/", head | {"Cookie": f"scantruss_studio={guard.token}"}) == ""
     assert "other sites" in guard.refusal(f"/?token={guard.token}", head | {"Origin": "http://evil.example"})
     assert len(guard.token) > 20 and Guard("0.0.0.0").token != guard.token
+
+
+def test_the_address_that_is_printed_can_be_opened() -> None:
+    assert address_to_open("127.0.0.1", 80, "") == "http://localhost:80/"
+    assert address_to_open("office", 80, "abc") == "http://office:80/?token=abc"
+    assert address_to_open("fd00::1", 80, "abc") == "http://[fd00::1]:80/?token=abc"
+    for everywhere in ("0.0.0.0", "::"):
+        assert f"//{everywhere}:" not in (given := address_to_open(everywhere, 80, "abc")) and "[::]" not in given
+        assert urlsplit(given).hostname and given.endswith(":80/?token=abc")
 
 
 def test_a_port_that_is_taken_is_refused() -> None:
@@ -161,6 +173,13 @@ def shown_colors(page: Any) -> np.ndarray:
     return np.asarray(picture.convert("RGB")).reshape(-1, 3).astype(int)
 
 
+def is_orange(pixels: np.ndarray) -> np.ndarray:
+    """Return which pixels (N, 3) have the colour of a fixed node, in light or shade (N,)."""
+    red, green, blue = pixels.T
+    found: np.ndarray = (red > 150) & (green > 0.3 * red) & (green < 0.62 * red) & (blue < 0.25 * red)
+    return found
+
+
 def drag(page: Any, begin: tuple[float, float], end: tuple[float, float]) -> None:
     """Drag from one place of the page to another."""
     page.mouse.move(*begin)
@@ -198,18 +217,21 @@ def downloaded(page: Any, kind: str, old: str, suffix: str, folder: Path) -> Pat
     return folder / f"{kind}{suffix}"
 
 
-FAINT = """() => {  // what is written with less contrast than 4.5 to 1 (WCAG 2.1, 1.4.3)
+FAINT = """() => {  // what is written with less contrast than 4.5 to 1 (WCAG 2.1, 1.4.3), and edges of controls with less than 3 (1.4.11)
   const light = (c) => { const f = c.map((v) => (v /= 255) <= 0.03928 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4);
     return 0.2126 * f[0] + 0.7152 * f[1] + 0.0722 * f[2]; };
   const parts = (s) => { const m = s.match(/[\\d.]+/g).map(Number); return m.length > 3 ? m : [...m, 1]; };
+  const behind = (e) => { for (let p = e; p; p = p.parentElement) {
+    const b = parts(getComputedStyle(p).backgroundColor); if (b[3] > 0.9) return b; } return [255, 255, 255]; };
+  const contrast = (...pair) => { const [a, b] = pair.map((c) => light(c.slice(0, 3)) + 0.05); return Math.max(a, b) / Math.min(a, b); };
   return [...document.querySelectorAll("body *")].filter((e) => {
-    const says = [...e.childNodes].some((n) => n.nodeType === 3 && n.textContent.trim())
-      || (e.tagName === "INPUT" && e.type === "text" && e.value);
-    if (!says || !e.getClientRects().length || e.tagName === "STYLE") return false;
-    let behind = [255, 255, 255, 1];
-    for (let p = e; p; p = p.parentElement) { const b = parts(getComputedStyle(p).backgroundColor); if (b[3] > 0.9) { behind = b; break; } }
-    const pair = [parts(getComputedStyle(e).color), behind].map((c) => light(c.slice(0, 3)) + 0.05);
-    return Math.max(...pair) / Math.min(...pair) < 4.5;
+    if (!e.getClientRects().length || e.tagName === "STYLE") return false;
+    const style = getComputedStyle(e), isInput = e.tagName === "INPUT";
+    const around = isInput ? behind(e.parentElement) : null;
+    const edges = [style.borderColor, style.backgroundColor].map(parts);
+    if (isInput && Math.max(...edges.map((edge) => contrast(edge, around))) < 3) return true;
+    const says = [...e.childNodes].some((n) => n.nodeType === 3 && n.textContent.trim()) || (isInput && e.type === "text" && e.value);
+    return says && contrast(parts(style.color), behind(e)) < 4.5;
   }).map((e) => `${e.className} ${e.textContent || e.value}`);
 }"""
 
@@ -356,6 +378,136 @@ def test_a_server_that_is_killed_loses_nothing_but_what_it_was_at(tmp_path: Path
             page.wait_for_selector(f"text={said.strip()}")
     finally:
         kill(process)
+
+
+def test_a_click_on_what_is_said_on_the_drawing_reaches_the_drawing(served: tuple[str, Session]) -> None:
+    address, session = served
+    with open_page(address) as (page, errors):
+        page.wait_for_selector("text=Generate")
+        assert session.worker.wait(60)
+        page.click("text=Crop >> nth=0")
+        page.click("button:has-text('Polygon')")
+        said = page.locator("[role=alert]:has-text('click the corners')")
+        said.wait_for()
+        page.wait_for_timeout(500)
+        box = said.bounding_box()
+        covered = (box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
+        for place in ((500, 300), (400, 500), covered):
+            page.mouse.click(*place)
+            page.wait_for_timeout(400)
+        assert until(lambda: len(field(page, "crop").input_value().split(",")) == 6), "three corners of two coordinates"
+        assert errors == []
+
+
+def test_a_file_that_is_too_large_is_not_sent(served: tuple[str, Session], tmp_path: Path) -> None:
+    address, session = served
+    for name, rows in (("large.xyz", 900), ("small.xyz", 400)):
+        np.savetxt(tmp_path / name, np.stack([*np.divmod(np.arange(rows), 20), np.zeros(rows)], axis=1), "%.1f")
+    with open_page(address) as (page, errors):
+        page.wait_for_selector("text=Generate")
+        words = page.locator("[data-largest]")
+        assert words.get_attribute("data-largest") == str(LARGEST_UPLOAD) and not words.is_visible()
+        page.evaluate("document.querySelector('[data-largest]').dataset.largest = 10000")
+        page.set_input_files("input[type=file]", tmp_path / "large.xyz")
+        page.wait_for_selector(f"text={TOO_LARGE}")
+        page.set_input_files("input[type=file]", tmp_path / "small.xyz")
+        page.wait_for_selector("text=400 points")
+        assert not words.is_visible() and session.history.words[0] == "open small.xyz"
+        assert errors == []
+
+
+UNREACHED = """() => {  // controls that are seen and that the Tab key has not been on, or on which nothing showed that it was
+  const all = `button:not([tabindex='-1']), input, [role=slider], [role=tab], canvas[data-engine],
+    [data-with-border] > .mantine-Paper-root:first-child`;
+  return [...document.querySelectorAll(all)].filter((e) => e.checkVisibility() && !e.disabled && !seen.has(e))
+    .map((e) => e.getAttribute("aria-label") || e.textContent || e.outerHTML.slice(0, 150));
+}"""
+NOTE_FOCUS = """() => {
+  const e = document.activeElement, style = getComputedStyle(e);
+  const isNamed = e.getAttribute("aria-label") || e.labels?.length || e.textContent.trim();
+  if (isNamed && style.outlineStyle === "solid" && parseFloat(style.outlineWidth) >= 2) seen.add(e);
+  return e === document.body;
+}"""
+
+
+def test_keys_alone_reach_everything(served: tuple[str, Session]) -> None:
+    address, session = served
+    with open_page(address) as (page, errors):
+        page.wait_for_selector("text=Generate")
+        assert session.worker.wait(60)
+        page.evaluate("() => { window.seen = new Set(); }")
+        for name in ("Scan", "Design", "Constraints", "Grid", "Compare", "Structure", "Out"):
+            page.focus(f"[role=tab]:has-text('{name}')")
+            page.keyboard.press("Enter")
+            for head in page.locator("[data-with-border] > [aria-expanded=false]:visible").all()[::-1]:
+                head.focus()
+                page.keyboard.press("Enter")
+            page.wait_for_timeout(400)
+            assert page.locator("[data-with-border] > [aria-expanded=false]:visible").count() == 0
+            for _ in range(2):  # from where it is to the end, and all around
+                for _ in range(200):
+                    page.keyboard.press("Tab")
+                    if page.evaluate(NOTE_FOCUS):
+                        break
+            assert page.evaluate(UNREACHED) == [], name
+        tab(page, "Constraints")
+        page.focus("button:has-text('Place by clicks')")
+        page.keyboard.press("Enter")
+        page.wait_for_selector("input[value='place fixed node']")
+        while (
+            page.evaluate("document.activeElement.tagName") != "CANVAS"
+        ):  # ends: it is in the ring that Tab goes around, as was seen
+            page.keyboard.press("Shift+Tab")
+        page.keyboard.press("Enter")  # the cross begins in the middle of the drawing, where the dome is
+        assert until(lambda: len(session.settings.fixed) == 1) and session.worker.wait(60)
+        (place,) = session.settings.fixed
+        assert until(lambda: bool(is_orange(shown_colors(page)).sum() > 10))  # its ball is drawn
+        page.keyboard.press(" ")
+        for _ in range(5):
+            page.keyboard.press("ArrowRight")
+            page.wait_for_timeout(50)
+        page.keyboard.press(" ")
+        assert until(lambda: session.settings.fixed != (place,))
+        assert len(session.settings.fixed) == 1 and session.settings.fixed[0][0] > place[0]
+        assert errors == []
+
+
+def test_what_goes_is_shown_within_the_scan(served: tuple[str, Session]) -> None:
+    address, session = served
+    with open_page(address) as (page, errors):
+        page.wait_for_selector("text=Generate")
+        assert until(lambda: session.grid is not None)
+        tab(page, "Grid")
+        for name in ("draw members", "draw panels"):
+            field(page, name).uncheck()
+
+        def drawn() -> int:
+            return int((shown_colors(page) != 255).any(axis=1).sum())
+
+        tab(page, "Scan")
+        assert not field(page, "draw scan").is_checked() and until(lambda: drawn() < 60_000)
+        empty = drawn()  # but for the legend and what the browser says
+        page.click("text=Clean >> nth=0")
+        page.click("button:has-text('Show what goes')")
+        page.wait_for_selector("text=of 3,600 points go")
+        assert field(page, "draw scan").is_checked() and until(lambda: drawn() > empty + 2000)
+        assert errors == []
+
+
+def test_a_tap_is_a_click(served: tuple[str, Session]) -> None:
+    address, _ = served
+    with open_page(address) as (page, errors):
+        tablet = page.context.browser.new_context(viewport={"width": 1024, "height": 768}, has_touch=True).new_page()
+        page.close()
+        tablet.goto(address)
+        tablet.wait_for_selector("text=Generate")
+        tablet.tap("[role=tab]:has-text('Constraints')")
+        tablet.tap("button:has-text('Place by clicks')")
+        tablet.wait_for_selector("input[value='place fixed node']")
+        tablet.wait_for_timeout(1000)
+        tablet.touchscreen.tap(284, 384)  # the middle of the drawing, where the dome is
+        tablet.wait_for_selector("text=undo: fixed node")
+        assert errors == []
 
 
 def test_two_browsers_have_a_project_each(served: tuple[str, Session]) -> None:

@@ -73,3 +73,23 @@ def test_scales_and_weights_are_words_of_the_page() -> None:
 def test_a_number_of_sections_that_is_none_is_refused() -> None:
     with pytest.raises(st.InputError, match="size is a number of different sections"):
         Session().set_structure(size=-1)
+
+
+def test_what_was_asked_for_since_the_structure_was_solved_is_kept_beside_it(tmp_path: Path) -> None:
+    session = session_of_dome(tmp_path, 6.0)
+    session.run_structure()
+    done(session)
+    before, solution = session.state.structure_settings, session.solution
+    assert solution is not None and session.state.is_structure_stale is False
+    session.set_structure(supports="N001")  # with which it is a mechanism
+    state = session.state
+    assert state.is_structure_stale and state.shown_structure == before
+    again = Session()
+    again.open(tmp_path / "dome.scantruss")  # of a server that was killed then
+    assert again.state.structure_settings.supports == "N001" and again.state.shown_structure == before
+    assert again.solution is not None and again.state.is_structure_stale
+    for one, other in zip(solution.all_results(), again.solution.all_results(), strict=True):
+        assert one.name == other.name and (one.displacements == other.displacements).all()
+    assert b'supports = "boundary"' in settings_files(again.state)["structure.toml"]
+    again.run_structure()
+    assert again.worker.wait(120) and again.message and again.state.shown_structure == before

@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,13 +14,13 @@ from scantruss.cli.main import main
 from scantruss.layouts.trade import COUNTS
 from scantruss.studio.outputs import command_of, settings_files
 from scantruss.studio.session import Session
-from scantruss.studio.trade_steps import Trade
+from scantruss.studio.state import Trade
 from scantruss.studio.trade_tool import curve_of, words_of_present
 
 
 def present(session: Session) -> Trade:
     """Return the trade, which must be known."""
-    trade = session.present_trade()
+    trade = session.state.trade
     assert trade is not None
     return trade
 
@@ -44,7 +45,7 @@ def test_what_is_taken_of_the_trade_is_what_the_command_line_makes(
     assert taken is not None and taken.certificate is not None and taken.certificate.passed
     assert taken.alike is not None and taken.alike.count == middle.number and taken.deviation is not None
     assert f"**{middle.number} " in words_of_present(trade, session.state)
-    assert session.present_trade() is trade  # another number can be taken
+    assert session.state.trade is trade  # another number can be taken
     again = Session()
     again.open(tmp_path / "dome.scantruss")
     assert again.grid is not None and again.grid.alike == taken.alike
@@ -58,7 +59,7 @@ def test_what_is_taken_of_the_trade_is_what_the_command_line_makes(
     few = st.read_grid("few.json")
     assert np.array_equal(few.nodes, taken.nodes) and few.alike == taken.alike
     session.undo()
-    assert session.grid is before and session.present_trade() is trade
+    assert session.grid is before and session.state.trade is trade
 
 
 def test_a_trade_needs_a_finished_grid_and_goes_with_it(tmp_path: Path) -> None:
@@ -69,17 +70,66 @@ def test_a_trade_needs_a_finished_grid_and_goes_with_it(tmp_path: Path) -> None:
         session.take_traded(5)
     session.find_trade("lengths", 0.2)
     done(session)
-    trade = present(session)
     session.take_traded(4)  # of 5 and 3: no more than that
     done(session)
     assert session.grid is not None and session.grid.alike is not None and session.grid.alike.count == 3
-    session.trade = None  # as in a project that was opened
+    session.state = replace(session.state, trade=None)  # as in a project of before
     with pytest.raises(st.InputError, match="lengths of this grid have been made alike"):
         session.find_trade("joints", 0.01)
     session.generate()
     done(session)
-    session.trade = trade
-    assert session.present_trade() is None
+    assert session.state.trade is None
+
+
+@pytest.mark.parametrize("parts", ["lengths", "panels"])
+def test_a_trade_is_kept_in_the_project(parts: str, tmp_path: Path) -> None:
+    session = session_of_dome(tmp_path, 10.0)
+    session.find_trade(parts, 0.05)
+    done(session)
+    trade = present(session)
+    place = tmp_path / "dome.scantruss"
+    written = place.read_bytes()
+    session.save()
+    assert place.read_bytes() == written
+    for take in (None, trade.traded[1].number):  # with the grid before, and with another
+        if take is not None:
+            session.take_traded(take)
+            done(session)
+        again = Session()
+        again.open(place)
+        kept = present(again)
+        assert (kept.parts, kept.off_scan) == (trade.parts, trade.off_scan) and (kept.before is again.grid) == (
+            take is None
+        )
+        assert np.array_equal(kept.before.nodes, trade.before.nodes)
+        for one, other in zip(kept.traded, trade.traded, strict=True):
+            assert one._replace(grid=other.grid) == other and one.grid.alike == other.grid.alike
+            assert np.array_equal(one.grid.nodes, other.grid.nodes)
+            assert np.array_equal(one.grid.triangles, other.grid.triangles)
+        again.take_traded(trade.traded[-1].number)
+        done(again)
+        assert (
+            again.grid is not None
+            and again.grid.alike is not None
+            and again.grid.alike.count == trade.traded[-1].number
+        )
+
+
+def test_a_trade_that_is_stopped_keeps_what_was_found(tmp_path: Path) -> None:
+    session = session_of_dome(tmp_path, 10.0)
+
+    def stop_at_second() -> None:
+        if session.state.trade is not None and len(session.state.trade.traded) == 2:
+            session.stop()
+
+    end = session.listen(stop_at_second)
+    session.find_trade("lengths", 0.02)
+    done(session)
+    end()
+    assert [each.number for each in present(session).traded] == list(COUNTS[:2])
+    again = Session()
+    again.open(tmp_path / "dome.scantruss")
+    assert [each.number for each in present(again).traded] == list(COUNTS[:2])
 
 
 def test_the_curve_has_a_place_to_click_for_each_number(tmp_path: Path) -> None:

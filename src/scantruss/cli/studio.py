@@ -36,7 +36,7 @@ def studio_parser() -> Parser:
 
 def studio(values: Namespace) -> None:
     """Serve the page until it is interrupted."""
-    from ..studio.server import LOOPBACK, check_viser
+    from ..studio.server import check_viser
 
     check_viser()
     if not 0 <= values.port < 65536:
@@ -48,7 +48,7 @@ def studio(values: Namespace) -> None:
 
     from ..report.terminal import print_lines
     from ..studio.browsers import Browsers
-    from ..studio.server import serve_browsers, start_server
+    from ..studio.server import address_to_open, serve_browsers, start_server
     from ..studio.session import Session
 
     session = Session(project, folder=Path.cwd())
@@ -59,8 +59,7 @@ def studio(values: Namespace) -> None:
     server, guard = start_server(values.host, values.port)
     try:
         serve_browsers(server, browsers)
-        shown = "localhost" if values.host in LOOPBACK else values.host
-        address = f"http://{shown}:{server.get_port()}/" + (f"?token={guard.token}" if guard.token else "")
+        address = address_to_open(values.host, server.get_port(), guard.token)
         saved = f"saved as {project} after each step" if project is not None else "saved here as soon as a scan is open"
         print_lines([f"studio at {address}", f"the project is {saved}; end with Ctrl-C"])
         sys.stdout.flush()  # for whoever reads it from a pipe, as nothing else is said

@@ -107,17 +107,22 @@ def few_kinds(grid: Grid, parts: PartVectors, asked: Alike, progress: Progress |
     asked : Alike
         Its tolerance is the largest root mean square of what is between the vectors of two parts of one kind.
     progress : callable, optional
-        Called before each round with what the parts are and the share of the work that is done at least; it may raise to cancel.
+        Called with what the parts are and the share of the work that is done at least; it may raise to cancel.
     """
     rounds, done = (1 + len(REGULAR_ROUNDS)) * ALIKE_ROUNDS, 0
 
-    def turned() -> None:
-        nonlocal done
+    def heard() -> None:
         if progress:
             progress(asked.parts, min(done / rounds, 1.0))
+
+    def turned() -> None:
+        nonlocal done
+        heard()
         done += 1
 
-    descent = _Descent(parts, Charts.of_grid(grid), Images.of_grid(grid), asked.tolerance, asked.mirrored, turned)
+    descent = _Descent(
+        parts, Charts.of_grid(grid), Images.of_grid(grid), asked.tolerance, asked.mirrored, turned, heard
+    )
     start = descent.at(grid.nodes).stage()
     found, first = [_fewest(descent, start, asked.count)], grid.nodes
     for rounds_of_start in REGULAR_ROUNDS:
@@ -181,11 +186,12 @@ class _Descent(NamedTuple):
     tolerance: float
     mirrored: bool
     turned: Callable[[], None]  #: called before each round
+    heard: Callable[[], None]  #: called within a round
 
     def at(self, nodes: np.ndarray) -> _State:
         """Return how alike the parts are of some nodes."""
         vectors = self.parts.vectors(nodes)
-        misfit, shift = self.parts.misfits(vectors, np.arange(len(vectors)), mirrored=self.mirrored)
+        misfit, shift = self.parts.misfits(vectors, np.arange(len(vectors)), mirrored=self.mirrored, heard=self.heard)
         return _State(nodes, vectors, misfit, shift, fewest_kinds(misfit <= self.tolerance, self.parts.count > 0))
 
     def regular(self, nodes: np.ndarray, rounds: int) -> np.ndarray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -10,6 +11,7 @@ import numpy as np
 
 from ..kernels.mesh.alike import turned_misfits
 
+PAIRS_AT_ONCE = 1_000_000  #: parts that are compared before it is asked whether to go on
 APART = 2.0  #: misfit of parts that cannot be alike
 
 
@@ -72,10 +74,26 @@ class PartVectors(ABC):
         turned_misfits(both, square, np.tile(count, 2), np.tile(self.is_open[parts], 2), others, False, misfit, shift)
         return misfit[: len(parts)]
 
-    def misfits(self, vectors: np.ndarray, others: np.ndarray, *, mirrored: bool) -> tuple[np.ndarray, np.ndarray]:
-        """Return misfits and shifts (N, C) of all parts to some of them; see `turned_misfits`."""
+    def misfits(
+        self, vectors: np.ndarray, others: np.ndarray, *, mirrored: bool, heard: Callable[[], None] | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Return misfits and shifts (N, C) of all parts to some of them; see `turned_misfits`.
+
+        Parameters
+        ----------
+        heard : callable, optional
+            Called before each of some blocks; it may raise to cancel.
+        """
         shape = len(self.count), len(others)
         misfit, shift = np.empty(shape), np.empty(shape, np.int16)
-        square = (vectors**2).sum(axis=(1, 2))
-        turned_misfits(self.own(vectors), square, self.count, self.is_open, others, mirrored, misfit, shift)
+        own, square = self.own(vectors), (vectors**2).sum(axis=(1, 2))
+        step = max(1, PAIRS_AT_ONCE // max(len(self.count), 1))
+        for first in range(0, len(others), step):
+            if heard is not None:
+                heard()
+            some = others[first : first + step]
+            block = len(self.count), len(some)
+            of_block = np.empty(block), np.empty(block, np.int16)
+            turned_misfits(own, square, self.count, self.is_open, some, mirrored, *of_block)
+            misfit[:, first : first + step], shift[:, first : first + step] = of_block
         return misfit, shift

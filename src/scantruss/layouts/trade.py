@@ -68,7 +68,9 @@ def traded_lengths(
         )
 
 
-def traded_kinds(before: Grid, found: PartKinds, off_scan: OffScan | None = None) -> list[Traded]:
+def traded_kinds(
+    before: Grid, found: PartKinds, off_scan: OffScan | None = None, progress: Progress | None = None
+) -> list[Traded]:
     """Return what numbers of kinds cost: of the grid as it was, and with which counts end, eight at most; plain misfits by bisection.
 
     Parameters
@@ -76,18 +78,28 @@ def traded_kinds(before: Grid, found: PartKinds, off_scan: OffScan | None = None
     before : Grid
     found : PartKinds
         Of that grid.
+    progress : callable, optional
+        Called with what the parts are and the share of the work that is done at least; it may raise to cancel.
     """
     which = np.unique(np.linspace(0, len(found.stages) - 1, MOST_STAGES).round().astype(int))
     mean, asked = float(before.lengths.mean()), found.grid.alike
     assert asked is not None
     nodes = found.stages[0].nodes
+    steps, done = len(which) * MISFIT_BISECTIONS, 0
+
+    def heard() -> None:
+        if progress:
+            progress(asked.parts, done / steps)
+
     misfit, _ = found.parts.misfits(
-        found.parts.vectors(nodes), np.arange(len(found.of)), mirrored=found.mirror_images_alike
+        found.parts.vectors(nodes), np.arange(len(found.of)), mirrored=found.mirror_images_alike, heard=heard
     )
     trade = []
     for stage in (found.stages[k] for k in which):
         low, high = 0.0, APART
         for _ in range(MISFIT_BISECTIONS):
+            heard()
+            done += 1
             middle = (low + high) / 2
             few = len(fewest_kinds(misfit <= middle, found.parts.count > 0)) <= len(stage.kinds)
             low, high = (low, middle) if few else (middle, high)

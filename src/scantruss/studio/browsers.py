@@ -73,6 +73,7 @@ class Browsers:
         session = Session(place, folder=self._first.folder)
         session.is_taken = self._saved_by_others(session)
         session.begin(self._begun)
+        session.show_quick()
         return session
 
     def _saved_by_others(self, own: Session) -> Callable[[Path], bool]:

@@ -44,6 +44,7 @@ class CleanTool:
                 raise InputError(f"{text.label} needs a number, got {text.value!r}") from None
         self.view.session.propose_cleaning(*numbers)
         self.view.scan.draws.value = True
+        self.view.scan.draw()
 
     def _keep(self) -> None:
         self.view.session.forget_cleaning()

@@ -79,7 +79,7 @@ class CropTool:
             handle = self.view.scene.api.add_transform_controls(
                 f"/crop {name}", scale=1.2, disable_rotations=True, depth_test=False, position=tuple(at.tolist())
             )
-            handle.on_update(self._dragged)
+            handle.on_update(self.view.in_order(self._dragged))
             self._handles.append(handle)
         self.view.see(np.concatenate([self._box_corners(), frame.corners]))
         self._show_box()

@@ -67,7 +67,7 @@ class DraggedBalls:
         self._places = places
         self._view.scene.balls(self._name, places, color, radius)
         if len(places):
-            self._view.scene.api.get_handle_by_name(self._name).on_drag("left")(self._dragged)
+            self._view.scene.api.get_handle_by_name(self._name).on_drag("left")(self._view.in_order(self._dragged))
 
     def _dragged(self, event: Any) -> None:
         number, ends = event.instance_index, event.phase == "end"

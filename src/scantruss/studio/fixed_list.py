@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, words_of_place
 from .dragging import DraggedBalls
 from .drawn_lines import clicked_point, numbers_of
 from .frame import SceneFrame
@@ -92,7 +92,7 @@ class FixedNodes:
             return
         fixed = state.settings.fixed
         kept = self.chosen.value.partition(":")[0]
-        words = tuple(f"{k}: {', '.join(f'{c:.6g}' for c in place)}" for k, place in enumerate(fixed, 1))
+        words = tuple(f"{k}: {words_of_place(place)}" for k, place in enumerate(fixed, 1))
         self.chosen.options = words or (NONE_CHOSEN,)
         if state.cloud is not None:
             places = np.array(fixed, float).reshape(-1, 3)

@@ -70,7 +70,7 @@ def _structure_report(state: StudioState, suffix: str) -> dict[str, bytes]:
     model = model_to_show(state, STRUCTURE)
     assert state.solution is not None and state.report is not None
     command = command_of(state).splitlines()[-1]
-    parts = report_parts(ReportSource("grid.json", command, state.structure_settings, state.solution, state.report))
+    parts = report_parts(ReportSource("grid.json", command, state.shown_structure, state.solution, state.report))
     if suffix == ".pdf":
         return {"structure-report.pdf": encode_pdf(parts)}
     return {"structure-report.html": encode_html(parts, encode_page(model, FileStyle()))}

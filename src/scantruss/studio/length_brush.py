@@ -128,7 +128,7 @@ class LengthBrush:
                 "/paint surface", self.view.frame.to_scene(grid.scan_nodes), grid.triangles.astype(np.uint32),
                 side="double", opacity=UNSEEN, cast_shadow=False, receive_shadow=False,
             )  # fmt: skip
-            self._surface.on_drag("left")(self._dragged)
+            self._surface.on_drag("left")(self.view.in_order(self._dragged))
 
     def _dragged(self, event: Any) -> None:
         """Take the places under a pointer that is dragged: one step in all."""

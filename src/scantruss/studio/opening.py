@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 
-from ..errors import ScanTrussError
+from ..errors import FormatError, InputError, ScanTrussError
 from ..scan.cloud import PointCloud
 from ..scan.formats.own_colors import COLOR_ATTRIBUTES, PACKED_COLOR, own_colors
 from ..scan.formats.reading import read_content
@@ -20,6 +21,16 @@ EXAMPLES = {
     "shell": ("shell.ply", Settings(length=1.0, unit="m")),
     "bust": ("nefertiti.ply", Settings(length=24.0, unit="mm")),
 }  #: bundled scans and usual lengths
+
+
+@contextmanager
+def called(name: str, path: Path) -> Iterator[None]:
+    """Let what is refused of a file say the name that a person gave it, in place of its path."""
+    try:
+        yield
+    except (FormatError, InputError) as error:
+        error.args = (str(error).replace(str(path), name),)
+        raise
 
 
 def read_whole(path: Path) -> PointCloud:

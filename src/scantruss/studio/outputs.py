@@ -88,7 +88,7 @@ def settings_files(state: StudioState) -> dict[str, bytes]:
     made = _of_the_file(state)
     files = {"settings.json": (json.dumps(made.to_dict(), indent=1, ensure_ascii=False) + "\n").encode()}
     if state.solution is not None:
-        files["structure.toml"] = settings_text(state.structure_settings).encode()
+        files["structure.toml"] = settings_text(state.shown_structure).encode()
     if state.removed is not None and state.cloud is not None:
         with temporary_folder() as folder:
             cloud = state.cloud

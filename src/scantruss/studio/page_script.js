@@ -11,6 +11,21 @@ addEventListener("drop", (event) => {
   input.dispatchEvent(new Event("change", { bubbles: true }));
 });
 
+// A file that is too large is not sent at all: it would fill the memory of browser and server before it is refused.
+addEventListener("change", (event) => {
+  const words = document.querySelector("[data-largest]");
+  if (!words || event.target.type !== "file" || !event.target.files.length) return;
+  words.hidden = event.target.files[0].size <= +words.dataset.largest;
+  if (words.hidden) return;
+  event.stopImmediatePropagation();
+  event.target.value = "";
+}, true);
+
+// A finger belongs to the drawing as soon as it is down, which viser takes for a handle that is being dragged: a tap would be no click.
+addEventListener("pointerdown", (event) => {
+  if (event.target.tagName === "CANVAS" && event.target.hasPointerCapture(event.pointerId)) event.target.releasePointerCapture(event.pointerId);
+}, true);
+
 // Keys that move a slider, the caret or a list turn the camera too, which listens further out: not while a control has them.
 addEventListener("DOMContentLoaded", () => document.body.addEventListener("keydown", (event) => {
   const plain = !event.ctrlKey && !event.metaKey && /^(Arrow.*|[a-zA-Z])$/.test(event.key);

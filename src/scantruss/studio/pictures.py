@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import io
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import InputError
+from ..runtime.progress import Progress
 from .frame import ROOM_AROUND
 from .scene import sky
 
@@ -35,17 +37,26 @@ class PictureTool:
         self._send("scantruss.png", [self._shot(height, width)], "PNG")
 
     def _turntable(self) -> None:
-        if self.view.session.cloud is None:
+        cloud = self.view.session.cloud
+        if cloud is None:
             raise InputError("there is no scan yet; open one")
+        every = max(1, len(cloud.points) // TURNED_POINTS)
+        drawn = self.view.frame.to_scene(np.asarray(cloud.points[::every]) + cloud.origin)
         self.view.say(f"taking {TURN_FRAMES} pictures; keep the page in front")
-        camera, cloud = self.view.client.camera, self.view.session.cloud
+        self.view.session.worker.ask(partial(self._take_turn, drawn))
+
+    def _take_turn(self, drawn: np.ndarray, progress: Progress) -> None:
+        """Take the pictures of a turntable that shows places of the scene (N, 3), as a task that Stop ends."""
+        progress("turntable", 0.0)
+        camera = self.view.client.camera
         position, target = np.array(camera.position), np.array(camera.look_at)
         turns = [2 * np.pi * k / TURN_FRAMES for k in range(TURN_FRAMES)]
         places = np.array([target + about_z(turn) @ (position - target) for turn in turns])
-        every = max(1, len(cloud.points) // TURNED_POINTS)
-        drawn = self.view.frame.to_scene(np.asarray(cloud.points[::every]) + cloud.origin)
         fov = min(float(camera.fov), angle_to_see(drawn, places, target, TURN_SIZE[1] / TURN_SIZE[0]))
-        frames = [self._shot(*TURN_SIZE, wxyz=facing(at, target), position=tuple(at), fov=fov) for at in places]
+        frames = []
+        for at in places:
+            frames.append(self._shot(*TURN_SIZE, wxyz=facing(at, target), position=tuple(at), fov=fov))
+            progress("turntable", len(frames) / TURN_FRAMES)
         self._send("turntable.gif", frames, "GIF")
 
     def _shot(self, height: int, width: int, **camera: Any) -> np.ndarray:

@@ -22,13 +22,14 @@ from ..scan.cloud import PointCloud
 from ..settings import Settings
 from ..structure.options import StructureSettings, read_structure_settings, settings_text
 from ..structure.statics import Solution
+from .project_trade import TRADE_BEFORE, TRADE_HEAD, TRADE_NODES, head_of_trade, nodes_of_trade, trade_of_parts
 from .scan_parts import Cleaning, WholeScan, part_of_scan, taken_of_scan
-from .state import Design, StudioState
+from .state import Design, StudioState, Trade
 
 PROJECT_FORMAT, PROJECT_VERSION = "scantruss-project", 5
 CLEANING_OF_PART = 3  #: last version in which a cleaning named the points of the part that was taken
-PROJECT_PARTS = ("made_by.npy", "project.json", "scan.npz", "removed.npy", "by_hand.npy", "structure.toml", "grid.json",
-                 "structure.json")  # fmt: skip
+PROJECT_PARTS = ("made_by.npy", "project.json", "scan.npz", "removed.npy", "by_hand.npy", "structure.toml", "solved.toml", "grid.json",
+                 "structure.json", TRADE_HEAD, TRADE_NODES, TRADE_BEFORE)  # fmt: skip
 FIXED_DATE = (1980, 1, 1, 0, 0, 0)  # the same project gives the same bytes
 Part = TypeVar("Part")
 LARGEST_PART = 8_000_000_000  #: of what is unpacked [bytes]
@@ -69,16 +70,25 @@ def save_project(path: Path, state: StudioState) -> None:
     if state.grid is not None:
         parts["grid.json"] = _kept(_GRIDS, state.grid, encode_json)
     if solved and state.solution is not None:
+        parts["solved.toml"] = settings_text(state.shown_structure).encode()
         parts["structure.json"] = _kept(
             _STRUCTURES, state.solution, lambda solution: encode_model(model_of(solution, report=state.report))
         )
+    if (trade := state.trade) is not None:
+        parts |= {
+            TRADE_HEAD: head_of_trade(trade, state.grid),
+            TRADE_NODES: _kept(_TRADES, trade, lambda one: _npz(nodes_of_trade(one))),
+        }
+        if trade.before is not state.grid:
+            parts[TRADE_BEFORE] = _kept(_GRIDS, trade.before, encode_json)
     parts |= {f"design-{k}.json": _kept(_GRIDS, each.grid, encode_json) for k, each in enumerate(state.designs, 1)}
-    write_files({path: _zipped(parts, zipfile.ZIP_DEFLATED, stored=("scan.npz",))})
+    write_files({path: _zipped(parts, zipfile.ZIP_DEFLATED, stored=("scan.npz", TRADE_NODES))})
 
 
 _SCANS: weakref.WeakKeyDictionary[WholeScan, bytes] = weakref.WeakKeyDictionary()
 _GRIDS: weakref.WeakKeyDictionary[Grid, bytes] = weakref.WeakKeyDictionary()
 _STRUCTURES: weakref.WeakKeyDictionary[Solution, bytes] = weakref.WeakKeyDictionary()
+_TRADES: weakref.WeakKeyDictionary[Trade, bytes] = weakref.WeakKeyDictionary()
 
 
 def _kept(known: weakref.WeakKeyDictionary[Part, bytes], part: Part, encode: Callable[[Part], bytes]) -> bytes:
@@ -97,7 +107,7 @@ def _encode_scan(whole: WholeScan) -> bytes:
         arrays["classes"] = whole.classes
     if whole.colors is not None:
         arrays["colors"] = whole.colors
-    return _zipped({f"{name}.npy": _npy(array) for name, array in arrays.items()}, zipfile.ZIP_DEFLATED)
+    return _npz(arrays)
 
 
 def read_project(path: Path) -> tuple[StudioState, bool]:
@@ -163,8 +173,10 @@ def _project_of(parts: dict[str, bytes]) -> tuple[StudioState, bool]:
         settings=settings,
         grid=grid,
         asked=None if asked is None else Settings.from_dict(asked),
+        trade=trade_of_parts(parts, grid, _grid_of),
         is_live=bool(head.get("quick", False)) and grid is not None,
         structure_settings=_structure_settings_of(parts["structure.toml"]),
+        solved_with=_structure_settings_of(parts["solved.toml"]) if "solved.toml" in parts else None,
         designs=tuple(
             Design(each["name"], _grid_of(parts[f"design-{k}.json"]), tuple((a, b) for a, b in each["figures"]))
             for k, each in enumerate(head.get("designs", ()), 1)
@@ -201,6 +213,10 @@ def _npy(array: np.ndarray) -> bytes:
     stream = io.BytesIO()
     np.save(stream, array, allow_pickle=False)
     return stream.getvalue()
+
+
+def _npz(arrays: dict[str, np.ndarray]) -> bytes:
+    return _zipped({f"{name}.npy": _npy(array) for name, array in arrays.items()}, zipfile.ZIP_DEFLATED)
 
 
 def _zipped(parts: dict[str, bytes], way: int, stored: Collection[str] = ()) -> bytes:

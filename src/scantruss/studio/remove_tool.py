@@ -40,7 +40,7 @@ class RemoveTool:
         self.view.scan.draws.value = True
         self.view.scan.draw()
         if not self._listens:
-            self.view.client.scene.on_rect_select(modifier="shift")(self._dragged)
+            self.view.client.scene.on_rect_select(modifier="shift")(self.view.in_order(self._dragged))
             self._listens = True
         self.view.say("hold Shift and drag a rectangle over the points that are to go")
 

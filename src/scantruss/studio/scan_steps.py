@@ -15,15 +15,18 @@ from ..runtime.progress import Progress
 from ..scan.cloud import PointCloud
 from ..scan.member_length import length_range, suggest_length
 from ..settings import Settings
-from .opening import DATA_FOLDER, EXAMPLES, marks_of, next_free, read_whole
+from .opening import DATA_FOLDER, EXAMPLES, called, marks_of, next_free, read_whole
 from .project import read_project
 from .scan_parts import Cleaning, WholeScan, cleaning_of, part_of_scan
-from .solving import solved_state
+from .solving import solved_again
 from .state import StudioState
 from .steps import Steps
 
 LARGEST_UPLOAD = 500_000_000  #: of a scan that comes through the page [bytes]
-NO_GRID: dict[str, Any] = {"grid": None, "asked": None, "is_live": False, "solution": None, "report": None}
+TOO_LARGE = f"a scan of more than {LARGEST_UPLOAD:,} bytes; name it on the command line: scantruss studio SCAN"
+NO_GRID: dict[str, Any] = {
+    "grid": None, "trade": None, "asked": None, "is_live": False, "solution": None, "report": None
+}  # fmt: skip
 """Changes of a scan that is another now."""
 
 
@@ -57,7 +60,7 @@ class ScanSteps(Steps):
         """
         if path.suffix.lower() == ".scantruss":
             state, solved = read_project(path)
-            self.begin(solved_state(state) if solved else state)
+            self.begin(solved_again(state) if solved else state)
             return
         cloud = read_whole(path)
         self._start(WholeScan(cloud, *marks_of(path, cloud)))
@@ -67,18 +70,15 @@ class ScanSteps(Steps):
 
         def read(progress: Progress) -> None:
             if len(content) > LARGEST_UPLOAD:
-                raise InputError(
-                    f"a scan of more than {LARGEST_UPLOAD:,} bytes; name it on the command line: scantruss studio SCAN"
-                )
+                raise InputError(TOO_LARGE)
             own = Path(name.replace("\\", "/")).name
             progress("read", 0.1)
-            with temporary_folder() as folder:
-                path = folder / (own or "scan")
+            with temporary_folder() as folder, called(own, path := folder / (own or "scan")):
                 path.write_bytes(content)
                 if path.suffix.lower() == ".scantruss":
                     state, solved = read_project(path)
                     number, place = self._place_for(own)
-                    self._open_state(f"open {own}", solved_state(state) if solved else state, number, place)
+                    self._open_state(f"open {own}", solved_again(state) if solved else state, number, place)
                     return
                 cloud = read_whole(path)
                 classes, colors = marks_of(path, cloud)
@@ -108,12 +108,14 @@ class ScanSteps(Steps):
         def read(progress: Progress) -> None:
             progress("read", 0.1)
             if path.suffix.lower() == ".scantruss":
-                state, solved = read_project(path)
-                taken = solved_state(state) if solved else state
+                with called(name.strip(), path):
+                    state, solved = read_project(path)
+                taken = solved_again(state) if solved else state
                 place = next_free(path, self.is_taken) if self.is_taken(path) else path
                 self._open_state(f"open {path.name}", taken, max(self._places) + 1, place)
                 return
-            cloud = read_whole(path)
+            with called(name.strip(), path):
+                cloud = read_whole(path)
             self._start(WholeScan(cloud, *marks_of(path, cloud)))
             self._make("quick", progress, live=True)
 

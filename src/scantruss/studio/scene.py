@@ -29,7 +29,7 @@ MOST_DRAWN_LINES = 4000  #: members that are drawn as lines
 MOST_BEADS = 33_000  #: points by which so many members are drawn
 BEADS, BEAD_SIZE = (
     (3, 12),
-    0.6,
+    0.45,
 )  #: points of such a member at least and at most, and how large they are [their distance]
 TUBE_SIDES = 8
 BODY_GAMMA, PANEL_GAMMA = 2.2, 1.45  #: exponents of colours, see `lit`

@@ -6,6 +6,7 @@ import gzip
 import hmac
 import http
 import secrets
+import socket
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from http.cookies import CookieError, SimpleCookie
@@ -20,9 +21,13 @@ if TYPE_CHECKING:
     from .browsers import Browsers
 
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
+SOMEWHERE = {
+    "0.0.0.0": "192.0.2.1",
+    "::": "2001:db8::1",
+}  #: addresses of examples (RFC 5737, 3849), by what listens everywhere
 COOKIE = "scantruss_studio"
 BROWSER_KEY = "scantruss_browser"
-PAGE_SCRIPT = Path(__file__).with_name("page_script.js")
+PAGE_SCRIPTS = tuple(Path(__file__).with_name(name) for name in ("page_script.js", "page_keys.js"))
 STORAGE_PATIENCE = 5.0  #: how long a browser may take to say who it is [s]
 Handler = Callable[[Any, Any], Any]
 
@@ -75,11 +80,12 @@ class Guard:
         return ""
 
     def _add_script(self, answer: Any) -> None:
-        """Give a page our own script; pages that were served before are remembered."""
+        """Give a page our own scripts; pages that were served before are remembered."""
         is_packed = answer.headers.get("Content-Encoding") == "gzip"
         if (kept := self._pages.get(is_packed)) is None or kept[0] != answer.body:
             page = gzip.decompress(answer.body) if is_packed else answer.body
-            page = page.replace(b"<head>", b"<head><script>{" + PAGE_SCRIPT.read_bytes() + b"}</script>", 1)
+            scripts = b"".join(b"<script>{" + each.read_bytes() + b"}</script>" for each in PAGE_SCRIPTS)
+            page = page.replace(b"<head>", b"<head>" + scripts, 1)
             kept = self._pages[is_packed] = (answer.body, gzip.compress(page) if is_packed else page)
         answer.body = kept[1]
         del answer.headers["Content-Length"]
@@ -165,8 +171,6 @@ def start_server(host: str, port: int) -> tuple[Any, Guard]:
         viser is not installed, or nothing can be served there.
     """
     check_viser()
-    import socket
-
     import viser
 
     with socket.socket(
@@ -185,6 +189,27 @@ def start_server(host: str, port: int) -> tuple[Any, Guard]:
         server = viser.ViserServer(host=host, port=port, label="ScanTruss studio", verbose=False)
     server.request_share_url = _no_tunnel  # a page could else ask for a way in from the network
     return server, guard
+
+
+def address_to_open(host: str, port: int, token: str) -> str:
+    """Return the address at which a browser finds the studio: where it listens to all of this machine's, the one that others reach."""
+    if host in LOOPBACK:
+        host = "localhost"
+    elif host in SOMEWHERE:
+        host = _own_address(host)
+    shown = f"[{host}]" if ":" in host else host
+    return f"http://{shown}:{port}/" + (f"?token={token}" if token else "")
+
+
+def _own_address(everywhere: str) -> str:
+    """Return the address of this machine in its network; its name where it is in none."""
+    family = socket.AF_INET6 if ":" in everywhere else socket.AF_INET
+    with socket.socket(family, socket.SOCK_DGRAM) as trial:
+        try:
+            trial.connect((SOMEWHERE[everywhere], 9))  # of datagrams: nothing is sent
+            return str(trial.getsockname()[0])
+        except OSError:
+            return socket.gethostname()
 
 
 def serve_browsers(server: Any, browsers: Browsers) -> None:

@@ -22,6 +22,7 @@ from ..surface.samples import sample_surface
 from .compare import kept_design
 from .features import Feature, find_features, switched_off
 from .outputs import command_of, files_of, model_to_show
+from .scan_steps import NO_GRID
 from .solving import check_words, solved_state
 from .trade_steps import TradeSteps
 
@@ -94,7 +95,7 @@ class Session(TradeSteps):
             grid = grid_from_cloud(cloud, settings.replace(effort=effort), progress=watched)
         finally:
             self.front = None
-        made: dict[str, Any] = {"grid": grid, "asked": settings, "is_live": live, "solution": None, "report": None}
+        made = NO_GRID | {"grid": grid, "asked": settings, "is_live": live}
         with self._lock:
             if turn != self._turn or (live and len(grid.edges) > MOST_LIVE_MEMBERS):
                 return
@@ -179,6 +180,7 @@ class Session(TradeSteps):
         settings = self.state.structure_settings.replace(**given)
         if settings != self.state.structure_settings:
             self.change("structure", structure_settings=settings)
+            self.save()
 
     def run_structure(self) -> None:
         """Make the structure of the grid and solve it."""
@@ -189,7 +191,7 @@ class Session(TradeSteps):
             solved = solved_state(self.state, progress)
             if turn != self._turn or solved.grid is not self.grid:
                 return
-            self.change("run", solution=solved.solution, report=solved.report)
+            self.change("run", solution=solved.solution, report=solved.report, solved_with=solved.solved_with)
             self.save()
 
         self.worker.ask(run, then=True)

@@ -70,4 +70,12 @@ def solved_state(state: StudioState, progress: Progress = _silent) -> StudioStat
     report = report_structure(
         solution, asked.checks, buckling=buckling, vibration=vibration, rounds=rounds, weights=weights
     )
-    return replace(state, solution=solution, report=report)
+    return replace(state, solution=solution, report=report, solved_with=asked)
+
+
+def solved_again(state: StudioState) -> StudioState:
+    """Return the state of a project with its structure solved as it was, whatever has been asked for since."""
+    asked = state.structure_settings
+    return replace(
+        solved_state(replace(state, structure_settings=state.solved_with or asked)), structure_settings=asked
+    )

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..grid.grid import Grid
+from ..layouts.trade import Traded
 from ..scan.cloud import PointCloud
 from ..settings import Settings
 from ..structure.options import StructureSettings
@@ -29,6 +30,20 @@ class Design:
 
 
 @dataclass(frozen=True, eq=False)
+class Trade:
+    """What the numbers of lengths or kinds of a grid cost."""
+
+    before: Grid
+    parts: str  #: of `scantruss.grid.alike`
+    traded: tuple[Traded, ...]  #: the most lengths or kinds first
+    off_scan: float  #: farthest node of the grid before off the scan, over its mean member
+
+    def with_at_most(self, number: int) -> Traded:
+        """Return the most lengths or kinds that are no more than a number; the fewest where all are more."""
+        return next((each for each in self.traded if each.number <= number), self.traded[-1])
+
+
+@dataclass(frozen=True, eq=False)
 class StudioState:
     """What a studio works on."""
 
@@ -37,9 +52,11 @@ class StudioState:
     settings: Settings = NO_LENGTH
     grid: Grid | None = None
     asked: Settings | None = None  #: with which the grid was asked for; its own say what was done to get it
+    trade: Trade | None = None  #: of the grid, or of the one that it was made of
     is_live: bool = False  #: whether the grid is a quick one, made while the length was chosen
     structure_settings: StructureSettings = DEFAULT_STRUCTURE
     solution: Solution | None = None
+    solved_with: StructureSettings | None = None  #: with which it was solved
     report: StructureReport | None = None
     designs: tuple[Design, ...] = ()
     whole: WholeScan | None = None  #: as it was opened; `cloud` is what is taken of it
@@ -59,6 +76,16 @@ class StudioState:
         assert self.whole is not None
         all_of_it = self.settings.replace(crop=())
         return taken_of_scan(self.whole, all_of_it, self.cleaning, self.removed) & ~self.taken()
+
+    @property
+    def shown_structure(self) -> StructureSettings:
+        """Return the settings of the structure that is shown, of the next one where none is."""
+        return self.structure_settings if self.solution is None or self.solved_with is None else self.solved_with
+
+    @property
+    def is_structure_stale(self) -> bool:
+        """Whether settings have changed since the structure was solved."""
+        return self.solution is not None and self.shown_structure != self.structure_settings
 
     @property
     def is_stale(self) -> bool:

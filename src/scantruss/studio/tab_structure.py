@@ -51,8 +51,8 @@ def weight_bars(weights: dict[int, float]) -> str:
         for count, mass in sorted(weights.items())
     )
     return (
-        f'<table style="font-size:.85em;width:100%;padding:0 .6em"><caption style="text-align:left">mass by the most different'
-        f" sections</caption>{rows}</table>"
+        f'<table style="font-size:.85em;width:100%;padding:0 .6em"><caption style="text-align:left;padding:0 .6em">mass by'
+        f" the most different sections</caption>{rows}</table>"
     )
 
 

@@ -2,49 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import replace
 
 from ..errors import InputError
 from ..grid.alike import JOINTS, LENGTHS
-from ..grid.grid import Grid
 from ..layouts.joints_alike import few_joints
 from ..layouts.on_scan import ScanOfGrid
 from ..layouts.panels_alike import few_panels
 from ..layouts.trade import COUNTS, Traded, traded_kinds, traded_lengths
 from ..runtime.progress import Progress
 from .scan_steps import ScanSteps
+from .state import Trade
 
 FOUND_SHARE = 0.9  #: of the progress of a trade of kinds, when they have been found
-
-
-@dataclass(frozen=True, eq=False)
-class Trade:
-    """What the numbers of lengths or kinds of a grid cost."""
-
-    before: Grid
-    parts: str  #: of `scantruss.grid.alike`
-    traded: tuple[Traded, ...]  #: the most lengths or kinds first
-    off_scan: float  #: farthest node of the grid before off the scan, over its mean member
-
-    def with_at_most(self, number: int) -> Traded:
-        """Return the most lengths or kinds that are no more than a number; the fewest where all are more."""
-        return next((each for each in self.traded if each.number <= number), self.traded[-1])
 
 
 class TradeSteps(ScanSteps):
     """Steps with few different parts."""
 
-    trade: Trade | None = None  #: that was found last
-    _taken_of_trade: tuple[Grid, ...] = ()  # grids of it that were taken
-
-    def present_trade(self) -> Trade | None:
-        """Return the trade of the present grid, or of the one that it was made of."""
-        trade, grid = self.trade, self.grid
-        known = trade is not None and (grid is trade.before or any(grid is each for each in self._taken_of_trade))
-        return trade if known else None
-
     def find_trade(self, parts: str, tolerance: float, *, mirrored: bool = False) -> None:
-        """Look for what the numbers of lengths or kinds cost, as a step of the worker; those that are found are seen at once.
+        """Look for what the numbers of lengths or kinds cost, as a step of the worker; those that are found are seen and saved at once.
 
         Parameters
         ----------
@@ -60,7 +38,7 @@ class TradeSteps(ScanSteps):
         InputError
             There is no finished grid, or its parts have been made alike.
         """
-        shown, grid, cloud = self.present_trade(), self.grid, self.cloud
+        shown, grid, cloud, turn = self.state.trade, self.grid, self.cloud, self._turn
         before = grid if shown is None else shown.before
         if before is None or cloud is None or before.settings is None or (shown is None and self.state.is_live):
             raise InputError("few different parts are made of a finished grid; press Generate")
@@ -70,30 +48,38 @@ class TradeSteps(ScanSteps):
             )
         settings = before.settings
 
+        def keep(traded: Sequence[Traded], off: float) -> None:
+            with self._lock:
+                if turn != self._turn:
+                    return
+                self.state = replace(self.state, trade=Trade(before, parts, tuple(traded), off))
+            self.save()
+            self.tell()
+
         def look(progress: Progress) -> None:
             progress(parts, 0.0)
             scan = ScanOfGrid.of(cloud, settings)
             off = scan.farthest_node(before) / float(before.lengths.mean())
-            self._taken_of_trade = () if shown is None else self._taken_of_trade
             if parts == LENGTHS:
-                traded: tuple[Traded, ...] = ()
-                for turn, count in enumerate(COUNTS):
+                traded: list[Traded] = []
+                for done, count in enumerate(COUNTS):
 
-                    def report(stage: str, share: float, turn: int = turn) -> None:
-                        progress(stage, (turn + share) / len(COUNTS))
+                    def report(stage: str, share: float, done: int = done) -> None:
+                        progress(stage, (done + share) / len(COUNTS))
 
-                    traded += tuple(traded_lengths(before, tolerance, (count,), scan.farthest_node, report))
-                    self.trade = Trade(before, parts, traded, off)
-                    self.tell()
+                    traded += traded_lengths(before, tolerance, (count,), scan.farthest_node, report)
+                    keep(traded, off)
                 return
 
-            def shared(stage: str, share: float) -> None:
+            def of_finding(stage: str, share: float) -> None:
                 progress(stage, FOUND_SHARE * share)
 
+            def of_trading(stage: str, share: float) -> None:
+                progress(stage, FOUND_SHARE + (1.0 - FOUND_SHARE) * share)
+
             few = few_joints if parts == JOINTS else few_panels
-            found = few(before, tolerance, mirrored=mirrored, progress=shared)
-            progress(parts, FOUND_SHARE)
-            self.trade = Trade(before, parts, tuple(traded_kinds(before, found, scan.farthest_node)), off)
+            found = few(before, tolerance, mirrored=mirrored, progress=of_finding)
+            keep(traded_kinds(before, found, scan.farthest_node, of_trading), off)
 
         self.worker.ask(look)
 
@@ -105,7 +91,7 @@ class TradeSteps(ScanSteps):
         InputError
             No trade of the grid is known.
         """
-        trade, cloud, turn = self.present_trade(), self.cloud, self._turn
+        trade, cloud, turn = self.state.trade, self.cloud, self._turn
         if trade is None or cloud is None or trade.before.settings is None:
             raise InputError("the trade of this grid is not known yet; press Find the trade")
         chosen, settings = trade.with_at_most(number), trade.before.settings
@@ -116,7 +102,6 @@ class TradeSteps(ScanSteps):
             with self._lock:
                 if turn != self._turn:
                     return
-                self._taken_of_trade = (*self._taken_of_trade, grid)
                 words = f"{chosen.number} {trade.parts if trade.parts == LENGTHS else f'kinds of {trade.parts}'}"
                 self.change(words, grid=grid, is_live=False, solution=None, report=None)
             self.save()

@@ -8,10 +8,9 @@ import numpy as np
 
 from ..errors import InputError
 from ..grid.alike import JOINTS, LENGTHS, WHAT_IS_ALIKE
-from .trade_steps import Trade
 
 if TYPE_CHECKING:
-    from .state import StudioState
+    from .state import StudioState, Trade
     from .view import StudioView
 
 NUMBER_FIELD = "at most"  #: label of the field that a click on the curve fills
@@ -63,9 +62,12 @@ class TradeTool:
 
     def fill(self, _before: StudioState | None, state: StudioState) -> None:
         """Show the trade of the grid of a state."""
-        trade = self.view.session.present_trade()
+        trade = state.trade
         if self._drawn == (trade, state.grid):
             return
+        if trade is not None and trade not in self._drawn:
+            self.parts.value = trade.parts  # as of a project that was opened
+            self._choose()
         self._drawn = (trade, state.grid)
         self.curve.content = "" if trade is None else curve_of(trade, present_number(state))
         self.number.visible = trade is not None

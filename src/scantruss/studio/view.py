@@ -17,9 +17,11 @@ from ..export.page_tables import Tables, tables_of
 from ..structure.build import scale_of
 from .colours import colorings_of_scan
 from .frame import BESIDE_FIRST, DRAWN_EXTENT, ROOM_AROUND, SceneFrame, distance_to_see
+from .in_order import InOrder
 from .legends import Legends
 from .outputs import model_to_show
 from .picking import NEAR_ENOUGH, pick
+from .scan_steps import LARGEST_UPLOAD, TOO_LARGE
 from .scene import FIRST_POINTS, Scene
 from .session import Session
 from .state import StudioState
@@ -40,6 +42,7 @@ NATURAL_VIEW = 0.65  #: of the camera, upright [rad]
 PLAN_VIEW = 0.08  #: the same of a plan, seen from so far that heights hardly matter [rad]
 PLAN_FAR = 1.3  #: of the camera above a plan, so that all of it is seen [distance at which it fills the view]
 PANEL_WIDTH, USUAL_WIDTH = 452, 1280  #: of the panel; of a page that has not said its own [pixel]
+LEAST_DRAWING = 0.4  #: of a page that the drawing has beside the panel, which lies over it on narrower ones
 FIRST_SEEN_FROM = np.array([0.8, -1.4, 0.9])  #: direction from which the scan is seen first
 STEP_NAMES = ("Stop", "Undo", "Redo")
 SMALL_PICTURE, PICTURE_WAIT = (
@@ -57,8 +60,10 @@ class StudioView:
         self.session, self.client = session, client
         self.scene = Scene(client.scene)
         whole = float(client.camera.image_width or USUAL_WIDTH)
-        self._width = max(whole - PANEL_WIDTH, 0.5 * whole)  # of the drawing once the panel is beside it [pixel]
-        self._lock = RLock()
+        self._width = max(
+            whole - PANEL_WIDTH, LEAST_DRAWING * whole
+        )  # of the drawing once the panel is beside it [pixel]
+        self._lock, self.in_order = RLock(), InOrder()
         self._typed: dict[Callable[[], None], Timer] = {}  # steps of what was typed, which wait for more
         self._typing = RLock()
         self._shown: StudioState | None = None
@@ -77,6 +82,7 @@ class StudioView:
             gui.configure_theme(show_share_button=False, show_logo=False, control_width="large")
             gui.add_html(PANEL_STYLE)
             self.message = gui.add_markdown("")
+            gui.add_html(words_of_large_upload())
             self.progress = gui.add_progress_bar(0.0, visible=False)
             generate = gui.add_button("Generate", color="blue", hint="with the effort that Design says (Ctrl+Enter)")
             self.steps = gui.add_button_group(
@@ -105,7 +111,7 @@ class StudioView:
             self.steps.on_click(self.step(lambda: self._step(self.steps.value)))
             self._add_keys(gui)
         self.tabs = (self.design, self.constraints, self.structure, self.look, self.scan, self.compare, self.files)
-        client.scene.on_click()(self._clicked)
+        client.scene.on_click()(self.in_order(self._clicked))
         self._end = session.listen(self.update)
         self.update()
 
@@ -117,6 +123,7 @@ class StudioView:
     def close(self) -> None:
         """Stop listening to the session."""
         self._end()
+        self.in_order.close()
 
     # ---- controls
 
@@ -271,7 +278,7 @@ class StudioView:
     def metres(self) -> float:
         """Return the metres of one scan unit in the structure."""
         state = self.session.state
-        asked = state.structure_settings
+        asked = state.shown_structure
         return scale_of(state.settings.unit or (state.cloud.unit if state.cloud else "") or asked.unit, asked.scale)
 
     def places(self, model: Model) -> np.ndarray:
@@ -321,6 +328,8 @@ class StudioView:
             words = f"**Refused:** {session.message}" if session.message else session.stage or "ready"
             if state.is_stale and not session.message and not session.stage:
                 words = "The grid was made before the last change: press **Generate**"
+            elif state.is_structure_stale and not session.message and not session.stage:
+                words = "The structure was solved before the last change: press **Run**"
             undo, redo = session.history.words
             taken = " · ".join(f"{way}: {what}" for way, what in (("undo", undo), ("redo", redo)) if what)
             self.message.content = words + (f"\n\n<small>{taken}</small>" if taken else "")
@@ -336,3 +345,10 @@ class StudioView:
                 tab.fill(before, state)
             if state.cloud is not None and (before is None or before.cloud is not state.cloud):
                 self.overview()
+
+
+def words_of_large_upload() -> str:
+    """Return what the page says of a file that is larger than it sends; hidden until one is chosen (`page_script.js`)."""
+    return (
+        f'<p hidden role="alert" data-largest="{LARGEST_UPLOAD}" style="padding:0 .6em"><b>Refused:</b> {TOO_LARGE}</p>'
+    )
