@@ -17,7 +17,7 @@ from scantruss import pipeline
 from scantruss.attempts import Attempt
 from scantruss.cli.main import main
 from scantruss.report.advice import LEAST_TRIED, MOST_TRIED, SURE_PER_SPACING, TRIED_AROUND, Advice, LengthTrial
-from scantruss.report.lengths import advice_rows
+from scantruss.report.lengths import advice_lines, advice_rows
 from scantruss.scan.member_length import length_range, round_length, suggest_length
 from scantruss.surface.samples import SurfaceSamples
 
@@ -224,6 +224,19 @@ def test_of_lengths_that_pass_one_is_suggested_that_is_followed_by_another(monke
     assert advice.suggest() == usual
     advice._found[shorter] = LengthTrial(shorter, passed)
     assert advice.suggest() == shorter
+
+
+def test_a_length_that_only_the_table_tried_and_that_passes_is_suggested_in_place_of_one_that_does_not() -> None:
+    cloud = cloud_of("limpet")
+    advice = Advice(cloud, st.Settings(length=1.0))
+    advice.is_spent = True
+    length = advice._usual
+    grid = cast(Any, SimpleNamespace(certificate=None))
+    advice._found = {
+        length: LengthTrial(length, None, st.FrontError("it fails")),
+        2.0 * length: LengthTrial(2.0 * length, grid),
+    }
+    assert advice_lines(advice, length, cloud)[-1] == f"try --length {2.0 * length:g}"
 
 
 def test_a_length_that_is_tried_again_goes_on_where_it_paused(monkeypatch: pytest.MonkeyPatch) -> None:

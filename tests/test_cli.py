@@ -106,7 +106,27 @@ def refused(capsys: pytest.CaptureFixture[str], *words: Any, status: int = 2) ->
             "grid scan.xyz a.obj --length 4,7",
             "--length: needs a number, a file of lengths or curvature:MIN:MAX; write 4.7 with a point, not 4,7",
         ),
+        ("grid scan.xyz a.obj --length ,7", "write .7 with a point, not ,7"),
         ("grid scan.xyz a.obj --length 1500mm", "in the unit of the scan, without mm"),
+        ("grid scan.xyz a.obj --length 1,5m", "in the unit of the scan, without m"),
+        (
+            "grid scan.xyz a.obj --length 1/2",
+            "--length: needs a number, a file of lengths or curvature:MIN:MAX, got '1/2'",
+        ),
+        ("grid scan.xyz a.obj --length lengths.csv", "there is no file lengths.csv"),
+        (
+            "grid scan.xyz a.obj --length 4 --ridge-angle 40,5",
+            "--ridge-angle: needs a number; write 40.5 with a point, not 40,5",
+        ),
+        (
+            "grid scan.xyz a.obj --length 4 --allow-missing 5%",
+            "--allow-missing: needs a number without %, got 5%; one percent is 0.01",
+        ),
+        (
+            "clean scan.xyz a.xyz --spacing 20mm",
+            "--spacing: needs a number without mm, got 20mm; --help tells its unit",
+        ),
+        ("grid scan.xyz a.obj --length 4 --boundary no.csv", "cannot read boundaries no.csv"),
         ("grid scan.xyz a.obj --lenght 4", "unknown option --lenght (did you mean --length?)"),
         ("grid scan.xyz a.obj --length 4 --merge-angle wide", "--merge-angle: needs a number"),
         ("grid scan.xyz a.obj --length 4 --smooth-passes 1.5", "--smooth-passes: needs a whole number"),

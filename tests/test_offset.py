@@ -143,6 +143,15 @@ def test_the_room_across_is_that_of_a_look_at_all_pairs(seed: int) -> None:
     assert room_across(curve, reach, 0.05) == pytest.approx(np.minimum(away.min(axis=1), reach))
 
 
+def test_a_step_that_leads_nowhere_has_endless_room_without_a_warning() -> None:
+    """Also where the unit is so small that the room is a large number."""
+    steps = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]])
+    out = np.array([[1.0, 0.0, 0.0]] * 3)
+    with np.errstate(all="raise"):
+        share = module.explained(steps, out, np.full(3, 1e12), density=0.1, inwards=2.0)
+    assert share == pytest.approx([1.0, 1.0, 1.0])
+
+
 def test_runs_go_on_around_the_end_of_a_curve() -> None:
     def told(text: str) -> list[int]:
         return runs_around(np.array([c == "x" for c in text])).tolist()

@@ -11,7 +11,8 @@ from typed import known
 
 import scantruss as st
 from scantruss.cli.main import main
-from scantruss.scan.member_length import length_range
+from scantruss.report.advice import Advice
+from scantruss.scan.member_length import length_range, suggest_length
 from scantruss.surface.floor import find_floor
 
 
@@ -72,6 +73,67 @@ def test_two_layers_closer_than_half_a_member_are_told_with_their_distance(apart
     distance, share = samples.layers
     assert (share > 0.8) == said
     assert not said or distance == pytest.approx(apart, rel=0.1)
+
+
+@pytest.mark.parametrize("length", [1.5, 2.0])
+def test_two_layers_are_told_where_the_scan_is_so_dense_that_it_looks_smooth(length: float) -> None:
+    rng = np.random.default_rng(4)
+    points = np.concatenate([plate(rng, 60_000), plate(rng, 60_000) + [0, 0, 0.15]]) + rng.normal(
+        0, 0.004, (120_000, 3)
+    )
+    samples = st.sample_surface(st.PointCloud.from_array(points), st.Settings(length=length))
+    assert samples.smooth
+    distance, share = samples.layers
+    assert share > 0.5 and distance == pytest.approx(0.15, rel=0.1)
+
+
+def scan_lines(rng: np.random.Generator) -> np.ndarray:
+    """Twelve lines of a scanner over a vault, far apart, with many points on each."""
+    along, across = rng.uniform(0, 30, 6000), 2.5 * rng.integers(0, 12, 6000)
+    return np.column_stack([along, across, 0.004 * (across - 14.0) ** 2]) + rng.normal(0, 0.002, (6000, 3))
+
+
+def test_lines_of_a_scanner_get_a_length_that_spans_them_and_three_lines_get_none() -> None:
+    rng = np.random.default_rng(8)
+    cloud = st.PointCloud.from_array(scan_lines(rng))
+    advice = Advice(cloud, st.Settings(length=1.0))
+    with pytest.raises(st.InputError, match="the points lie along lines"):
+        st.sample_surface(cloud, st.Settings(length=suggest_length(cloud)))
+    length = advice.suggest()
+    assert known(advice.try_length(length)).passed and length > 2.5
+    short = known(advice.try_length(1.5))
+    assert not short.passed and "the points lie along lines" in str(short.fault)
+    with pytest.raises(st.InputError, match="the points lie along lines"):
+        Advice(st.PointCloud.from_array(three_lines(rng)), st.Settings(length=1.0))
+
+
+@pytest.mark.parametrize(
+    ("length", "way_on"), [("1.2", "a grid passes with --length"), ("9", "use at most 8.5; a grid passes")]
+)
+def test_lines_of_a_scanner_are_refused_with_a_length_that_passes(
+    length: str, way_on: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    np.savetxt("lines.xyz", scan_lines(np.random.default_rng(8)), fmt="%.4f")
+    assert main(["grid", "lines.xyz", "a.obj", "--length", length, "--effort", "quick"]) == 2
+    assert way_on in capsys.readouterr().err
+
+
+def test_a_sheet_that_was_not_asked_for_is_listed_though_it_lies_near_the_grid(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Nor is it rounded off, too small, or apart from the other in a box."""
+    rng = np.random.default_rng(4)
+    points = np.concatenate([plate(rng, 30_000), plate(rng, 30_000) + [0, 0, 0.62]]) + rng.normal(0, 0.004, (60_000, 3))
+    monkeypatch.chdir(tmp_path)
+    np.savetxt("two.xyz", points, fmt="%.4f")
+    assert main(["grid", "two.xyz", "a.json", "--length", "1.3", "--effort", "quick", "--piece", "1"]) == 0
+    said = capsys.readouterr()
+    assert "--piece 2 takes it alone" in said.err and "--crop" not in said.err
+    assert "too small" not in said.err and "rounds off" not in said.out
+    certificate = known(st.read_grid("a.json").certificate)
+    (part,) = [part for part in certificate.left_out if part.kind == "not chosen"]
+    assert part.points == 30_000 and part.asked and certificate.missing == 0.0
 
 
 def room(rng: np.random.Generator, floor_at: float = 0.0, sides: tuple[float, float] = (9, 6)) -> np.ndarray:

@@ -3,6 +3,7 @@
 ScanTrussError
     InputError     data or a setting cannot be used (also a ValueError)
       LengthError      the member length cannot be used with this scan
+      LinesError       at this member length the points lie along lines
       OneSidedError    the surface has one side, as a Moebius strip
     FrontError     the front stopped early; has .grid, what was reached, and .where
       CertificateError   a whole grid that does not pass; .grid has its certificate
@@ -27,6 +28,20 @@ class InputError(ScanTrussError, ValueError):
 
 class LengthError(InputError):
     """A member length cannot be used with this scan."""
+
+
+class LinesError(InputError):
+    """At this member length the points lie along lines, not on a surface.
+
+    Attributes
+    ----------
+    lines : int
+        How many lines there are that are apart.
+    """
+
+    def __init__(self, message: str, lines: int) -> None:
+        super().__init__(message)
+        self.lines = lines
 
 
 class OneSidedError(InputError):

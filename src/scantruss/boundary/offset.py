@@ -148,9 +148,11 @@ def explained(step: np.ndarray, out: np.ndarray, room: np.ndarray, density: floa
     density : points to a length of the steps and one place of the curve
     """
     along = dots(step, out)
-    run = runs_around(along > 0.0)
+    outwards = along > 0.0
+    run = runs_around(outwards)
     missing = np.bincount(run, np.abs(along))[run] * density
-    bay = np.minimum(2.0 - missing / POINTS_OF_CLOSED_BAY, room / np.maximum(along, 1e-300))
+    roomy = np.divide(room, along, out=np.full(len(along), np.inf), where=outwards)
+    bay = np.minimum(2.0 - missing / POINTS_OF_CLOSED_BAY, roomy)
     tongue = 2.0 - np.linalg.norm(step, axis=1) / inwards
-    share: np.ndarray = np.clip(np.where(along > 0.0, bay, tongue), 0.0, 1.0)
+    share: np.ndarray = np.clip(np.where(outwards, bay, tongue), 0.0, 1.0)
     return share

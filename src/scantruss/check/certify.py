@@ -23,7 +23,7 @@ from .doubtful import doubtful_places
 from .folds import fold_angles
 from .gaps import bridged_gaps
 from .irregular import count_irregular
-from .left_out import OTHER_PIECES, parts_left_out
+from .left_out import parts_left_out
 from .limits import ROUNDED_BY, limits_of, places_to_look_at, widened_limits
 from .sheets import cut_apart, faults_on_sheets, nodes_of_samples
 
@@ -157,12 +157,13 @@ def _apart(
     members = at_triangles[found.triangle]
     known = found.triangles[np.isfinite(found.triangles)]
     in_reach = known <= COVER_REACH * at_triangles[np.isfinite(found.triangles)]
-    beyond = np.isin(samples.judged, (KEPT, LIMB, SLIT)) & (found.scan > COVER_REACH * members)
+    wanted = np.isin(samples.judged, (KEPT, LIMB, SLIT)) & ~samples.elsewhere
+    beyond = wanted & (found.scan > COVER_REACH * members)
     left_out = parts_left_out(samples, boundary, gaps, found, members, COVER_REACH * members)
     return {
         "points": len(samples.scan),
         "left_out": left_out,
-        "missing": max(0.0, float(beyond.mean()) - sum(part.share for part in left_out if part.kind in OTHER_PIECES)),
+        "missing": max(0.0, float(beyond.mean()) - sum(part.share for part in left_out if part.kind == "pieces")),
         "scan_within_reach": float((found.scan <= COVER_REACH * members).mean()),
         "grid_within_reach": float(in_reach.mean()) if len(known) else 1.0,
         "scan_distance": _spread(found.scan, samples.scan, grid, length / members),
@@ -202,7 +203,11 @@ def _desired_at_points(grid: Grid, found: Distances, length: float) -> np.ndarra
 def _missed(grid: Grid, samples: SurfaceSamples, found: Distances, length: float) -> int:
     """Return which point is the farthest from the grid of those that are not named otherwise: kept and within a member."""
     members = _desired_at_points(grid, found, length)
-    return int(np.where((samples.judged == KEPT) & (found.scan <= members), found.scan / members, -1.0).argmax())
+    return int(
+        np.where(
+            (samples.judged == KEPT) & ~samples.elsewhere & (found.scan <= members), found.scan / members, -1.0
+        ).argmax()
+    )
 
 
 def _rounded(grid: Grid, samples: SurfaceSamples, found: Distances, length: float) -> float:
@@ -214,7 +219,7 @@ def _rounded(grid: Grid, samples: SurfaceSamples, found: Distances, length: floa
         return 0.0
     members = _desired_at_points(grid, found, length)
     off = (found.scan > ROUNDED_BY * members) & (found.scan <= COVER_REACH * members)
-    return float(((samples.judged == KEPT) & off).mean())
+    return float(((samples.judged == KEPT) & ~samples.elsewhere & off).mean())
 
 
 def _spread(values: np.ndarray, places: np.ndarray, grid: Grid, weight: np.ndarray) -> Spread | None:

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from ..surface.samples import SurfaceSamples
     from .distances import Distances
 
-OTHER_PIECES = ("pieces", "not chosen", "floor")  # parts of the scan that are pieces by themselves, without a grid
 LIMBS_APART = 0.5  # gap between points of two limbs [member lengths]
 PLACES_LISTED = 5  # places of a kind that are listed one by one; the others are one entry without a place
 
@@ -62,10 +61,10 @@ def points_left_out(
     for kind, judged in (("outliers", OUTLIER), ("sparse", SPARSE_POINT), ("rods", ROD), ("duplicates", DUPLICATE)):
         if len(which := np.flatnonzero(samples.judged == judged)):
             parts.append(_part(kind, which, samples, distance))
-    away = np.flatnonzero((samples.judged == KEPT) & (distance > reach))
+    away = np.flatnonzero((samples.judged == KEPT) & ((distance > reach) | samples.elsewhere))
     owner = owners_of(samples, samples.scan[away])
     small = (owner >= 0) & ~samples.kept[owner]
-    other = small & np.isin(samples.piece[owner], samples.not_chosen)
+    other = samples.elsewhere[away]
     floor = other & (samples.piece[owner] == (-1 if samples.floor is None else samples.floor))
     beyond_cut = _beyond_cut(samples, away, np.where(small & ~other, samples.piece[owner], -1), members)
     for kind, judged, more in (("limbs", LIMB, away[beyond_cut]), ("slits", SLIT, away[:0])):

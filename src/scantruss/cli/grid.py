@@ -9,7 +9,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
 
-from ..errors import CertificateError, FormatError, FrontError, LengthError
+from ..errors import CertificateError, FormatError, FrontError, LengthError, LinesError
 from ..export.drawing.style import VIEWS
 from ..export.style import OBJ_ELEMENTS, FileStyle
 from ..settings.values import ROTATION_NUMBERS
@@ -183,6 +183,8 @@ def grid_with_notes(
             grid = grid_from_cloud(cloud, settings, progress=bars, keep_failed=keep_failed, read_seconds=read_seconds)
         except LengthError as error:
             raise LengthError(f"{error}{nearby_words(bars, cloud, settings, advice)}") from None
+        except LinesError as error:
+            raise LinesError(f"{error}{nearby_words(bars, cloud, settings, advice)}", error.lines) from None
         except FrontError as error:
             note_layers(bars, cloud, settings)
             note_pieces(bars, cloud, settings)

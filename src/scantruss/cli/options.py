@@ -19,6 +19,9 @@ from ..settings import CURVATURE, RECORDS, Settings
 from ..settings.values import SYMMETRIES_FOUND
 from .positions import position, read_planes, read_polylines, read_positions
 
+DECIMAL_COMMA = re.compile(r"[-+]?\d*,\d+")
+WITH_UNIT = re.compile(r"[-+]?\d*[.,]?\d+\s*([a-z]+|\"|')", re.IGNORECASE)  # a number with its unit
+
 
 class UsageError(InputError):
     """The command line cannot be understood."""
@@ -95,7 +98,22 @@ def number(text: str) -> float:
     try:
         return float(text)
     except ValueError:
-        raise argparse.ArgumentTypeError(f"needs a number, got {text!r}") from None
+        raise argparse.ArgumentTypeError(f"needs a number{_why_no_number(text)}") from None
+
+
+def _why_no_number(text: str) -> str:
+    """Say of a text that is nearly a number what is wrong with it, to follow "needs a number"."""
+    if DECIMAL_COMMA.fullmatch(text):
+        return _with_point(text)
+    if text.endswith("%"):
+        return f" without %, got {text}; one percent is 0.01"
+    if found := WITH_UNIT.fullmatch(text):
+        return f" without {found[1]}, got {text}; --help tells its unit"
+    return f", got {text!r}"
+
+
+def _with_point(text: str) -> str:
+    return f"; write {text.replace(',', '.')} with a point, not {text}"
 
 
 def numbers(text: str) -> tuple[float, ...]:
@@ -110,14 +128,14 @@ def length_or_field(text: str) -> float | str:
     if text.startswith(CURVATURE) or Path(text).is_file():
         return text
     needs = f"needs a number, a file of lengths or {CURVATURE}MIN:MAX"
-    if re.fullmatch(r"-?\d+,\d+", text):
-        raise argparse.ArgumentTypeError(f"{needs}; write {text.replace(',', '.')} with a point, not {text}")
-    if found := re.fullmatch(r"(-?\d*\.?\d+)\s*([a-z]+|\"|')", text, re.IGNORECASE):
+    if DECIMAL_COMMA.fullmatch(text):
+        raise argparse.ArgumentTypeError(f"{needs}{_with_point(text)}")
+    if found := WITH_UNIT.fullmatch(text):
         raise argparse.ArgumentTypeError(
-            f"{needs} in the unit of the scan, without {found[2]} (info tells the unit, --unit sets it);"
+            f"{needs} in the unit of the scan, without {found[1]} (info tells the unit, --unit sets it);"
             f" turn {text} into that unit"
         )
-    if "." in text or "/" in text or "\\" in text:
+    if re.search("[a-z]", text, re.IGNORECASE) and re.search(r"[./\\]", text):
         raise argparse.ArgumentTypeError(f"{needs}; there is no file {text}")
     raise argparse.ArgumentTypeError(f"{needs}, got {text!r}")
 

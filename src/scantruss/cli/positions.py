@@ -82,7 +82,7 @@ def read_polylines(path: str | Path, what: str = "fixed line") -> list[NamedPart
     FormatError
         The file cannot be read, a line holds no position, or a polyline has fewer than two points.
     """
-    found = _read_parts(path, f"{what}s")
+    found = _read_parts(path, what.replace("boundary", "boundarie") + "s")
     stem = Path(path).stem
     for number, (_, part) in enumerate(found, 1):
         if len(set(part)) < 2:

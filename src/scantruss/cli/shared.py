@@ -169,7 +169,12 @@ def box_around(low: np.ndarray, high: np.ndarray, margin: float) -> str:
 
 
 def note_pieces(bars: Bars, cloud: PointCloud, settings: Settings) -> None:
-    """List the pieces of a scan with their sizes, and how to take one alone; nothing if there is only one."""
+    """List the pieces of a scan with their sizes, and how to take one alone; nothing if there is only one.
+
+    A box is named only where no other of these pieces reaches into it.
+    """
+    import numpy as np
+
     from ..surface.samples import sample_surface
 
     samples = sample_surface(cloud, settings)
@@ -179,13 +184,16 @@ def note_pieces(bars: Bars, cloud: PointCloud, settings: Settings) -> None:
         bars.note("a level, flat piece under the others is taken for the floor and left out; --piece all keeps it")
     unit = f" {cloud.unit}" if cloud.unit else ""
     large = sorted({*samples.pieces, *samples.not_chosen})
+    all_places = samples.surface.mean + cloud.origin
     option = "--piece" if settings.keep_rods else "--no-keep-rods --piece"
     for number, piece in enumerate(large[:MOST_PIECES], 1):
-        places = samples.surface.mean[samples.piece == piece] + cloud.origin
+        places = all_places[samples.piece == piece]
         low, high = places.min(axis=0), places.max(axis=0)
         size = " x ".join(words_of_number(side, 3) for side in high - low)
-        box = box_around(low, high, samples.surface.radius)
-        bars.note(f"piece {number}: {size}{unit}; {option} {number} takes it alone, --crop box:{box} all in its box")
+        of_others = np.isin(samples.piece, large) & (samples.piece != piece)
+        box, in_box = box_around(low, high, samples.surface.radius), (all_places >= low) & (all_places <= high)
+        crop = "" if (in_box.all(axis=1) & of_others).any() else f", --crop box:{box} all in its box"
+        bars.note(f"piece {number}: {size}{unit}; {option} {number} takes it alone{crop}")
     if len(large) > MOST_PIECES:
         bars.note(f"and {len(large) - MOST_PIECES} smaller pieces")
 

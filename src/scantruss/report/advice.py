@@ -5,6 +5,7 @@ How much is tried is counted in grids and in points, not in seconds: the same sc
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..attempts import AttemptLimit, attempts
-from ..errors import FrontError, LengthError, OneSidedError
+from ..errors import FrontError, LengthError, LinesError, OneSidedError
 from ..pipeline import first_that_passes
 from ..scan.member_length import exact_range, length_range, round_length, suggest_length
 from ..surface.samples import sample_surface
@@ -38,6 +39,7 @@ SHORTER_FIRST = (
     (2.8, A_FEW), (2.0, SOME_MORE),
 )  # fmt: skip
 NEARLY_NEXT = 1.45  # ratio of lengths that pass up to which the longer one stands for the next to the shorter
+LINES_OF_A_SCANNER = 5  # fewest lines of points that may be those of a scanner
 NEXT_LENGTH = 1.4  # a length is suggested if that many times it passes too
 NEARBY_LENGTHS = (
     1.12,
@@ -121,8 +123,32 @@ class Advice:
             float, tuple[Settings, Iterator[Attempt], AttemptLimit]
         ] = {}  # what is left to try of each length
         self.is_spent = False  #: whether a suggestion was looked for
-        self._usual = suggest_length(cloud)
+        self._usual = self._usual_length()
         self._count_at(self._usual, MOST_TRIED)
+
+    def _usual_length(self) -> float:
+        """Return the length that suits the scan; where the lines of a scanner are too far apart for it, the next that sees a surface.
+
+        Raises
+        ------
+        LinesError
+            The points lie along lines at every length, or along so few that these are none of a scanner.
+        """
+        usual, (_, longest) = suggest_length(self._cloud), length_range(self._cloud)
+        steps = math.ceil(math.log(max(longest / usual, 1.0), NEXT_LENGTH))
+        refused: LinesError | None = None
+        for step in range(steps + 1):
+            length = usual if step == 0 else min(_two_digits(usual * NEXT_LENGTH**step), longest)
+            try:
+                sample_surface(self._cloud, self._settings.replace(length=length))
+            except LinesError as error:
+                refused = refused or error
+                if refused.lines < LINES_OF_A_SCANNER:
+                    break
+            else:
+                return length
+        assert refused is not None
+        raise refused
 
     def _count_at(self, length: float, most: float) -> None:
         """Allow so many grids from now on, or fewer where the scan is large; a shorter length costs more than one that counts once."""
@@ -169,7 +195,7 @@ class Advice:
                 sharp_edges=made.sharp_edges,
                 plain_body=made.plain_body,
             )
-        except (FrontError, LengthError, OneSidedError) as error:
+        except (FrontError, LengthError, LinesError, OneSidedError) as error:
             fault = fault or (error if isinstance(error, FrontError) else FrontError(str(error)))
         self._left -= cost * (limit.runs - before)
         paused = limit.is_paused() and limit.runs > before

@@ -73,7 +73,7 @@ def _why(trial: LengthTrial) -> str:
     grid = getattr(trial.fault, "grid", None)
     if grid is not None and grid.certificate is not None:
         return " and ".join(fault.words.partition(";")[0] for fault in grid.certificate.faults[:MOST_WORDS])
-    return str(trial.fault)
+    return str(trial.fault).partition(";")[0]
 
 
 def advice_lines(advice: Advice, length: float, cloud: PointCloud) -> list[str]:
@@ -93,7 +93,9 @@ def advice_lines(advice: Advice, length: float, cloud: PointCloud) -> list[str]:
     if trial is not None and not trial.passed:
         where = trial.fault.where if trial.fault is not None else None
         place = "" if where is None else f" (near {words_of_place(where)})"
-        near = None if advice.is_spent else advice.nearby(length)
+        passing = [each.length for each in advice.tried if each.passed]
+        near = min(passing, key=lambda other: abs(np.log(other / length)), default=None)
+        near = advice.nearby(length) if near is None and not advice.is_spent else near
         lines += [f"at {length:g}{unit}: no grid passes: {_why(trial)}{place}"]
         lines += [f"try --length {near:g}" if near else "no length passes of those tried; clean or crop the scan first"]
     else:

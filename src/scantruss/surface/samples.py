@@ -35,6 +35,7 @@ from .floor import find_floor
 from .given_normals import GivenNormals, given_normals
 from .limbs import LimbRing, cut_limbs
 from .linked_samples import LINKED_POINTS_PER_THREAD, PATCH_SPACING, group, link_samples
+from .owners import owners_of
 from .pieces import chosen_pieces, large_pieces, number_pieces, sample_areas
 from .rods import rod_points
 from .shape import check_is_surface, layers_of_surface
@@ -101,12 +102,21 @@ class SurfaceSamples:
         """Which samples are of pieces that get a grid (S,) bool."""
         return np.isin(self.piece, self.pieces)
 
+    @cached_property
+    def elsewhere(self) -> np.ndarray:
+        """Which points lie on pieces that are large enough but were not chosen (N,) bool."""
+        there = np.zeros(len(self.scan), np.bool_)
+        if self.not_chosen:
+            kept = np.flatnonzero(self.judged == KEPT)
+            owner = owners_of(self, self.scan[kept])
+            there[kept] = (owner >= 0) & np.isin(self.piece[owner], self.not_chosen)
+        return there
+
     @property
     def left_out(self) -> tuple[int, float]:
-        """Number of pieces without a grid but the floor, and their share of the samples, which is about that of the area."""
+        """Number of pieces too small for a grid, and their share of the samples, which is about that of the area."""
         samples = np.bincount(self.piece)
-        floor = () if self.floor is None else (self.floor,)
-        small = np.delete(samples, [*self.pieces, *floor])
+        small = np.delete(samples, [*self.pieces, *self.not_chosen])
         return len(small), float(small.sum() / samples.sum())
 
     @cached_property

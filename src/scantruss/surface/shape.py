@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, LinesError
 from .mean_surface import RADIUS_OF_BALLS
 
 if TYPE_CHECKING:
@@ -17,6 +17,7 @@ PLACES_LOOKED_AT = 40  # places of a scan that are looked at
 FEWEST_SAMPLES = 60  # samples below which nothing is concluded
 SAMPLES_LOOKED_AT = 5_000  # most samples from which the variance around a place is taken
 LINE_VARIANCE = 0.02  # largest second variance of points along a line [first variance]
+SHARE_OF_A_LINE = 0.01  # share of the samples that a line has at least
 VOLUME_VARIANCE = 0.45  # least smallest variance of points that fill a volume, within a member [largest variance]
 NEAR_VOLUME_VARIANCE = 0.25  # the same within half a member
 DECISIVE_SHARE = 0.6  # share of the places above which a scan counts as lines or as a volume
@@ -36,8 +37,10 @@ def check_is_surface(samples: SurfaceSamples) -> None:
 
     Raises
     ------
+    LinesError
+        The points lie along lines, which longer members may make a surface of.
     InputError
-        The points are not a scan of a surface.
+        The points fill a volume.
     """
     mean = samples.surface.mean
     if len(mean) < FEWEST_SAMPLES:
@@ -56,9 +59,10 @@ def check_is_surface(samples: SurfaceSamples) -> None:
             least, _, largest = _spread(_nearest_points(samples.surface, place))
             volumes += bool(least >= NEAR_VOLUME_VARIANCE * largest)
     if lines > DECISIVE_SHARE * looked:
-        raise InputError(
+        raise LinesError(
             "the points lie along lines, not on a surface; a grid needs a scan of a surface, or longer members if these are"
-            " the lines of a scanner"
+            " the lines of a scanner",
+            int((np.bincount(samples.piece) > SHARE_OF_A_LINE * len(mean)).sum()),
         )
     if volumes > VOLUME_PLACES * looked:
         raise InputError(
@@ -93,7 +97,7 @@ def _points_near(surface: Surface, place: np.ndarray, radius: float) -> np.ndarr
 def layers_of_surface(samples: SurfaceSamples) -> tuple[float, float]:
     """Return the distance between two layers closer than half a member, and the share of places with two; 0, 0 for one layer."""
     surface = samples.surface
-    if samples.smooth or len(surface.mean) < FEWEST_SAMPLES:
+    if len(surface.mean) < FEWEST_SAMPLES:
         return 0.0, 0.0
     apart, looked, merged = [], 0, RADIUS_OF_BALLS * samples.moved
     reach, close = (max(least, merged) * surface.length for least in (LAYER_REACH, CLOSE_LAYERS))

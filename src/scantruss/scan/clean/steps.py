@@ -159,9 +159,9 @@ class _Work:
 
     def check_enough(self) -> None:
         """Refuse to go on with too few points."""
-        if len(self.points) < FEWEST_POINTS_OF_A_SURFACE:
+        if (count := len(self.points)) < FEWEST_POINTS_OF_A_SURFACE:
             raise InputError(
-                f"only {len(self.points)} points are left after cleaning, {FEWEST_POINTS_OF_A_SURFACE} are needed;"
+                f"only {count} point{' is' if count == 1 else 's are'} left after cleaning, {FEWEST_POINTS_OF_A_SURFACE} are needed;"
                 " keep more (--keep-outliers, --keep-pieces), or a smaller --spacing"
             )
 
