@@ -234,8 +234,8 @@ def test_fronts_that_fail_their_check_are_left_out_and_the_fault_of_the_best_is_
     fronts = st.advance_fronts(*steps, st.orientation_fields(steps.samples, steps.boundary, settings), settings)
     refused: list[st.Grid] = []
 
-    def check(grid: st.Grid, *_: Any) -> st.Grid:
-        if len(refused) < 3:
+    def check(grid: st.Grid, *others: Any) -> st.Grid:
+        if others[-1].effort == "best" and len(refused) < 3:
             refused.append(grid)
             raise FrontError(f"fault {len(refused)}")
         return grid
@@ -253,6 +253,33 @@ def test_fronts_that_fail_their_check_are_left_out_and_the_fault_of_the_best_is_
     monkeypatch.setattr(candidates, "checked", never)
     with pytest.raises(FrontError, match="fault 1"):
         st.optimize_fronts(fronts, *steps, settings)
+
+
+@pytest.mark.parametrize("fails", ["best", "normal"])
+def test_best_is_no_worse_than_normal_and_takes_part_only_where_that_passes(
+    shape: Shape, monkeypatch: pytest.MonkeyPatch, fails: str
+) -> None:
+    cloud, settings = st.PointCloud.from_array(shape.points), st.Settings(length=1.4 * shape.length, effort="best")
+    steps = steps_of(cloud, settings)
+    usual = st.grid_from_points(shape.points, settings.replace(effort="normal"))
+    fronts = st.advance_fronts(*steps, st.orientation_fields(steps.samples, steps.boundary, settings), settings)
+    checked = candidates.checked
+
+    def check(grid: st.Grid, *others: Any) -> st.Grid:
+        if others[-1].effort == fails:
+            raise FrontError(f"fault of {fails}")
+        return checked(grid, *others)
+
+    monkeypatch.setattr(candidates, "checked", check)
+    if fails == "normal":
+        with pytest.raises(FrontError, match="fault of normal"):
+            st.optimize_fronts(fronts, *steps, settings)
+        return
+    grid = st.optimize_fronts(fronts, *steps, settings)
+    found, theirs = known(known(grid.certificate).scan_distance), known(known(usual.certificate).scan_distance)
+    assert grid.settings == settings and known(grid.certificate).passed
+    assert grid.quality.length_cv <= usual.quality.length_cv and grid.quality.shape_mean >= usual.quality.shape_mean
+    assert found.p95 <= theirs.p95 and found.p99 <= theirs.p99
 
 
 def test_fronts_that_would_all_miss_the_same_limbs_are_not_tried() -> None:

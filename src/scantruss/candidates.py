@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TYPE_CHECKING, TypeVar
@@ -39,6 +39,7 @@ MISSED_MORE = 0.002  # share of the scan that the grid of a longer search may mi
 TURNS_OF_TIPS = 5  # times that nodes are put on tips
 TIMES_OF_A_FAULT = 2  # times that tips are given up near the same fault, ever farther around
 MOST_MISSED = 0.2  # largest share of the scan that a grid may miss where they are put on tips
+TURNS_OF_SEARCH = 12  # times that the grid of effort `normal` is searched again where none of `best` is better
 POOR_SHAPE = 0.4  # shape quality of its worst triangle below which a grid is poor: more finalists are tried
 FINALIST_BATCHES = 2  # times that finalists are tried
 
@@ -157,6 +158,27 @@ def best_that_passes(
     FrontError
         None passes; the fault of the first.
     """
+    if settings.effort == "best" and settings.method == "default":
+        return no_worse(candidates, samples, boundary, constraints, settings, progress=progress)
+    return grid_of(chosen(those_that_pass(candidates, samples, boundary, constraints, settings, progress=progress)))
+
+
+def those_that_pass(
+    candidates: Sequence[Candidate],
+    samples: SurfaceSamples,
+    boundary: Boundary,
+    constraints: Constraints,
+    settings: Settings,
+    *,
+    progress: Progress | None = None,
+) -> list[Candidate]:
+    """Improve the first candidates to the end, check them, and return those that pass, with their certificates.
+
+    Raises
+    ------
+    FrontError
+        None passes; the fault of the first.
+    """
 
     def finish(candidate: Candidate) -> None:
         try:
@@ -181,9 +203,7 @@ def best_that_passes(
         fault = candidates[0].fault
         assert fault is not None
         raise fault
-    if settings.effort == "best" and settings.method == "default":
-        return no_worse(passed, samples, boundary, constraints, settings)
-    return chosen(passed)
+    return passed
 
 
 def misses_at_most(grid: Grid, share: float) -> bool:
@@ -233,30 +253,59 @@ def reach_tips_of(
             mesh.restore(kept)
 
 
-def chosen(passed: Sequence[Candidate]) -> Grid:
-    """Return the best grid of candidates that pass: of those without a poor triangle the one of least `cost`."""
-    best = min(passed, key=lambda candidate: (candidate.is_poor, candidate.cost)) if len(passed) > 1 else passed[0]
-    assert best.grid is not None
-    return best.grid
+def chosen(passed: Sequence[Candidate]) -> Candidate:
+    """Return the best of candidates that pass: of those without a poor triangle the one of least `cost`."""
+    return min(passed, key=lambda candidate: (candidate.is_poor, candidate.cost)) if len(passed) > 1 else passed[0]
+
+
+def grid_of(candidate: Candidate) -> Grid:
+    """Return the grid of a candidate that passes."""
+    assert candidate.grid is not None
+    return candidate.grid
 
 
 def no_worse(
-    passed: Sequence[Candidate],
+    candidates: Sequence[Candidate],
     samples: SurfaceSamples,
     boundary: Boundary,
     constraints: Constraints,
     settings: Settings,
+    *,
+    progress: Progress | None = None,
 ) -> Grid:
-    """Return the best grid that is in no figure worse than that of effort `normal`, or that one where there is none."""
+    """Return the best grid that is in no figure worse than that of effort `normal`; where there is none, that one, searched on.
+
+    Raises
+    ------
+    FrontError
+        With effort `normal` none passes, so that this attempt is no better than a later one.
+    """
     lower = settings.replace(effort="normal")
-    try:
-        fields = orientation_fields(samples, boundary, lower)
-        fronts = advance_fronts(samples, boundary, constraints, fields, lower)
-        usual = optimize_fronts(fronts, samples, boundary, constraints, lower).replace(settings=settings)
-    except FrontError:
-        return chosen(passed)
-    better = [each for each in passed if each.grid is not None and _is_no_worse(each.grid, usual)]
-    return chosen(better) if better else usual
+    fields = orientation_fields(samples, boundary, lower)
+    fronts = advance_fronts(samples, boundary, constraints, fields, lower)
+    improved = improve_fronts(fronts, samples, boundary, constraints, lower)
+    usual = chosen(those_that_pass(improved, samples, boundary, constraints, lower))
+    better = []
+    with suppress(FrontError):
+        passed = those_that_pass(candidates, samples, boundary, constraints, settings, progress=progress)
+        better = [each for each in passed if _is_no_worse(grid_of(each), grid_of(usual))]
+    if better:
+        return grid_of(chosen(better))
+    search_on(usual, samples, boundary, constraints, lower)
+    return grid_of(usual).replace(settings=settings)
+
+
+def search_on(
+    candidate: Candidate, samples: SurfaceSamples, boundary: Boundary, constraints: Constraints, settings: Settings
+) -> None:
+    """Search a grid that passes again and again, and take the most even one that is in no figure worse than it was."""
+    usual = grid_of(candidate)
+    for _ in range(TURNS_OF_SEARCH):
+        grid = searched_again(candidate.mesh, candidate.front, samples, constraints, candidate.settings)
+        grid = checked(finish_rings(grid, boundary).replace(settings=settings), samples, boundary, settings)
+        passes = grid.certificate is not None and grid.certificate.passed and _is_no_worse(grid, usual)
+        if passes and grid.quality.length_cv < grid_of(candidate).quality.length_cv:
+            candidate.grid = grid
 
 
 def _is_no_worse(grid: Grid, other: Grid) -> bool:
