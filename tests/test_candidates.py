@@ -17,6 +17,7 @@ from typed import known
 import scantruss as st
 from scantruss import candidates, pipeline
 from scantruss.attempts import FRONT_LENGTHS, MOST_RUNS, SMOOTHED, Attempt, AttemptLimit, attempts
+from scantruss.check.certify import checked
 from scantruss.errors import CertificateError, FrontError
 from scantruss.improve.optimize import improve_last
 from scantruss.scan.formats.writing import write_points
@@ -263,7 +264,6 @@ def test_best_is_no_worse_than_normal_and_takes_part_only_where_that_passes(
     steps = steps_of(cloud, settings)
     usual = st.grid_from_points(shape.points, settings.replace(effort="normal"))
     fronts = st.advance_fronts(*steps, st.orientation_fields(steps.samples, steps.boundary, settings), settings)
-    checked = candidates.checked
 
     def check(grid: st.Grid, *others: Any) -> st.Grid:
         if others[-1].effort == fails:
