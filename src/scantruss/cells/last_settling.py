@@ -11,16 +11,7 @@ from .quad_search import Search
 LAST_SWEEPS_OF_QUADS = 60  # most sweeps with each weight
 LAST_NEAR = 0.2  # distance of a node from the centre of its patch that gets it a new one [members]
 # weights of angles in the energy that are tried in turn after the usual one
-LOWER_ANGLES = (
-    0.4,
-    0.36,
-    0.32,
-    0.285,
-    0.255,
-    0.225,
-    0.2,
-    0.18,
-)
+LOWER_ANGLES = (0.4, 0.36, 0.32, 0.285, 0.255, 0.225, 0.2, 0.18)
 ASKEW = 20.0  # angle by which a corner that is not near a right angle is off it [degree]
 MORE_ASKEW = 1.2  # share of the corners askew before that may be so after
 MOST_ASKEW = 0.049  # largest share of all corners for which that holds

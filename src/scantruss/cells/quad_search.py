@@ -35,10 +35,10 @@ class Made(NamedTuple):
 class Search:
     """The search over a mesh of quads; what was tried in a round is tried again in the next only where the quads have changed."""
 
-    def __init__(self, mesh: QuadMesh) -> None:
+    def __init__(self, mesh: QuadMesh, irregular_price: float = IRREGULAR_PRICE) -> None:
         self.mesh, self.moves = mesh, Moves(mesh)
         self.price = 0.0  # energy of a quad more or less
-        self.irregular_price = IRREGULAR_PRICE  # of a member too many or too few
+        self.irregular_price = irregular_price  # of a member too many or too few
         self.twice = False  # whether moves that cost energy are followed by another
         self.clock = 0
         self.stamp = [0] * len(mesh.at)  # when each node was last changed
@@ -52,7 +52,7 @@ class Search:
 
     def refine(self) -> None:
         """Try all moves again, and let irregular nodes be where they make lengths and angles even."""
-        self.irregular_price = LAST_IRREGULAR_PRICE
+        self.irregular_price = min(self.irregular_price, LAST_IRREGULAR_PRICE)
         self.done.clear()
 
     def make(self, move: Move, allowed: float) -> Made | None:
