@@ -15,6 +15,7 @@ LEAST_GAIN = 1e-3  # least energy that a move must gain
 MOST_PRICE = 0.25  # largest energy that an average quad is assumed to have
 # what the square of the members too many or too few at a node counts beside the energy, and counts once few are left
 IRREGULAR_PRICE, LAST_IRREGULAR_PRICE = 0.3, 0.12
+LED_IRREGULAR_PRICE = 0.1  # the same where rows follow the curvature, which turns them
 RENEWED_IN_SEARCH = (
     0.4  # distance of a node from the centre of its patch that gets it a new one after a round [members]
 )

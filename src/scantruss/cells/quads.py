@@ -22,7 +22,7 @@ from .last_settling import settle_last, shortfall
 from .lead import Panels
 from .pairing import pairs_of
 from .quad_mesh import QuadMesh
-from .quad_search import IRREGULAR_PRICE, LAST_IRREGULAR_PRICE, Search, search_once
+from .quad_search import IRREGULAR_PRICE, LED_IRREGULAR_PRICE, Search, search_once
 from .row_lengths import row_lengths
 from .rows import Guide, RowStart, find_rows, lattice_places, offsets_of_edges, principal_directions, spread_rows
 from .stops import at_stops, slide_back
@@ -111,9 +111,7 @@ def quads_of(
     coarse, fine = fine_mesh(grid, mesh, 1), fine_mesh(grid, mesh, PARTS)
     closer = [replace(each, length=each.length * row_lengths(mesh, each.nodes)) for each in (coarse, fine)]
     guide = principal_directions(mesh, len(coarse.nodes)) if settings.rows == "curvature" else None
-    price = (
-        IRREGULAR_PRICE if guide is None else LAST_IRREGULAR_PRICE
-    )  # rows that turn with the curvature need such nodes
+    price = IRREGULAR_PRICE if guide is None else LED_IRREGULAR_PRICE
     starts, tried = ROW_STARTS[begin : begin + STARTS_TRIED[settings.effort]], []
     for number, start in enumerate(starts):
         report(0.6 * number / len(starts))
