@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..check.limits import WARN_WIDE
 from ..grid.panels import corner_angles_of
 from .quad_mesh import QUAD_ANGLES, QuadMesh
 from .quad_search import Search
@@ -42,6 +43,11 @@ def shortfall(search: Search) -> float:
     irregular = sum(moves.charge(v) > 0 for v in inside) / max(len(inside), 1)
     found = float(lengths.std() / lengths.mean()), _askew(mesh, quads) / quads.size, irregular
     return max(value / aim for value, aim in zip(found, AIMS, strict=True))
+
+
+def wide_corners(mesh: QuadMesh) -> int:
+    """Return how many corners are so wide that their panel is all but a triangle."""
+    return int((corner_angles_of(mesh.nodes, mesh.live()) > WARN_WIDE).sum())
 
 
 def _settle(mesh: QuadMesh, angles: float) -> None:

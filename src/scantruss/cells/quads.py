@@ -18,7 +18,7 @@ from ..runtime.progress import Progress
 from ..surface.scratch import with_own_scratch
 from .collapse import collapse
 from .fine_mesh import FineMesh, fine_mesh
-from .last_settling import settle_last, shortfall
+from .last_settling import settle_last, shortfall, wide_corners
 from .lead import Panels
 from .pairing import pairs_of
 from .quad_mesh import QuadMesh
@@ -119,12 +119,12 @@ def quads_of(
         first, work = _laid(grid, on[0], on[1], start, guide, opened)
         before, search = work.grid(first).quality, Search(work, price)
         tried.append(_Tried(search_once(search, twice=False), number, first, search, before))
-        if tried[-1].cost < LITTLE_LEFT:
+        if tried[-1].cost < LITTLE_LEFT and not wide_corners(work):
             break
     tried = _best_of(tried, settings.effort, report)
     for each in tried:
         settle_last(each.search.mesh)
-    best = min(tried, key=lambda each: (shortfall(each.search), each.number))
+    best = min(tried, key=lambda each: (wide_corners(each.search.mesh), shortfall(each.search), each.number))
     last = best.search.mesh.grid(best.first)
     mesh = opened(last)
     project_onto_scan(mesh, samples, boundary=not settings.boundary)
