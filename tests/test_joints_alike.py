@@ -10,8 +10,8 @@ from small_grids import dome, fan, make_grid, uneven
 import scantruss as st
 from scantruss.cli.main import main
 from scantruss.errors import InputError
+from scantruss.improve.images import Images
 from scantruss.layouts import alike
-from scantruss.layouts.images import Images
 from scantruss.layouts.joints_alike import stars_of
 from scantruss.scan.rotation import turn_about
 

@@ -16,7 +16,7 @@ from scantruss.cli.families import _of_kinds, families_parser
 from scantruss.cli.main import main
 from scantruss.errors import InputError
 from scantruss.export.json import encode_json
-from scantruss.layouts.images import Images
+from scantruss.improve.images import Images
 from scantruss.layouts.joints_alike import stars_of
 from scantruss.layouts.panels_alike import corners_of
 from scantruss.layouts.part_vectors import PartVectors

@@ -10,10 +10,12 @@ from scipy.spatial import cKDTree
 import scantruss as st
 from scantruss.cli.main import main
 from scantruss.errors import FrontError, InputError
+from scantruss.grid.panels import planarity_of
 from scantruss.scan.rotation import check_rotation, find_rotation, turn_about
 from scantruss.scan.symmetry import check_mirror_planes, find_mirror_planes, nearest_mirror_plane
 
 LENGTH = 12.0  # of members of the vault, 100 long
+HEXAGON_LENGTH = 7.0  # of members of its hexagons, of as many panels
 
 
 def vault(turn: float = 0.0, size: tuple[float, float] = (100.0, 70.0), lean: float = 0.0) -> np.ndarray:
@@ -91,9 +93,10 @@ def test_a_hole_beside_the_plane_is_refused_and_not_mirrored() -> None:
 
 @compiled_only
 @pytest.mark.parametrize("lean", [0.0, 12.0])
-@pytest.mark.parametrize("cells", ["triangle", "quad"])
+@pytest.mark.parametrize("cells", ["triangle", "quad", "hexagon"])
 def test_the_grid_is_its_own_image_to_rounding(lean: float, cells: str) -> None:
-    settings = st.Settings(length=LENGTH, symmetry="auto", effort="quick", cells=cells)
+    length = LENGTH if cells != "hexagon" else HEXAGON_LENGTH
+    settings = st.Settings(length=length, symmetry="auto", effort="quick", cells=cells)
     grid = st.grid_from_points(vault(0.3, lean=lean), settings)
     assert grid.certificate is not None and grid.certificate.passed and grid.settings is not None
     rows = grid.settings.symmetry
@@ -108,19 +111,38 @@ def test_the_grid_is_its_own_image_to_rounding(lean: float, cells: str) -> None:
         panels = {frozenset(panel) for panel in grid.panel_loops}
         assert {frozenset(image[list(panel)].tolist()) for panel in panels} == panels
         on = np.flatnonzero(image == np.arange(len(image)))
-        assert sum(pair <= set(on.tolist()) for pair in members) >= len(on) - 1 >= 4  # rows of members on the plane
+        if cells != "hexagon":
+            assert sum(pair <= set(on.tolist()) for pair in members) >= len(on) - 1 >= 4  # rows of members on the plane
     distinct = len(np.unique(np.round(grid.lengths, 9)))
     assert distinct < (0.4 if lean == 0 else 0.65) * len(grid.lengths)
     made = st.schedule(grid.replace(unit="m"), st.ScheduleSettings(tube=100.0))
     assert None not in made.node_types["mirror image"]
-    assert cells == "quad" or None not in made.panel_types["mirror image"]
+    assert cells != "triangle" or None not in made.panel_types["mirror image"]
     again = st.grid_from_points(vault(0.3, lean=lean), grid.settings)
     assert np.array_equal(again.nodes, grid.nodes) and np.array_equal(again.triangles, grid.triangles)
 
 
-def test_hexagons_are_not_made_symmetric() -> None:
-    with pytest.raises(InputError, match="symmetry needs cells triangle or quad, got hexagon"):
-        st.Settings(length=LENGTH, symmetry="auto", cells="hexagon")
+@compiled_only
+def test_symmetric_hexagons_keep_corners_fixed_nodes_and_their_images_and_are_made_planar() -> None:
+    points = vault(lean=12.0)
+    corners = np.array([[x, y] for x in (450.0, 550.0) for y in (-235.0, -165.0)])
+    place = points[np.hypot(points[:, 0] - 515.0, points[:, 1] + 185.0).argmin()]
+    settings = st.Settings(length=HEXAGON_LENGTH, symmetry="auto", effort="quick", cells="hexagon")
+    bent = st.grid_from_points(points, settings)
+    flat = st.grid_from_points(points, settings.replace(planar=True, fixed=[tuple(place.tolist())]))
+    for grid in (bent, flat):
+        away = np.linalg.norm(grid.scan_nodes[:, None, :2] - corners, axis=2).min(axis=0)
+        assert away.max() < 0.06 * HEXAGON_LENGTH
+        assert grid.settings is not None and grid.settings.cells == "hexagon"
+        assert not isinstance(grid.settings.symmetry, str)
+        (row,) = grid.settings.symmetry
+        apart, _ = cKDTree(grid.nodes).query(reflected(grid, tuple(row)))
+        assert apart.max() < 1e-12 * 700
+        assert not grid.line_sets  # the planes are no lines
+    off = [planarity_of(grid.nodes, grid.panel_table).mean() for grid in (bent, flat)]
+    assert off[1] < 0.8 * off[0]
+    away = np.linalg.norm(flat.scan_nodes - place, axis=1)
+    assert away.min() < 0.02 * HEXAGON_LENGTH and flat.fixed.sum() == 2
 
 
 def test_a_fixed_line_without_its_image_is_refused() -> None:
@@ -207,9 +229,10 @@ def test_turning_about_an_axis_keeps_it_and_adds_up() -> None:
 
 
 @compiled_only
-@pytest.mark.parametrize("cells", ["triangle", "quad"])
+@pytest.mark.parametrize("cells", ["triangle", "quad", "hexagon"])
 def test_the_grid_of_a_pinwheel_is_itself_when_turned(cells: str) -> None:
-    grid = st.grid_from_points(pinwheel(), st.Settings(length=12.0, symmetry="auto", effort="quick", cells=cells))
+    length = LENGTH if cells != "hexagon" else HEXAGON_LENGTH
+    grid = st.grid_from_points(pinwheel(), st.Settings(length=length, symmetry="auto", effort="quick", cells=cells))
     assert grid.cells == cells and grid.topology.manifold and grid.topology.orientable
     assert grid.certificate is not None and grid.certificate.passed and grid.settings is not None
     assert not isinstance(grid.settings.symmetry, str)

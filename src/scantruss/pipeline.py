@@ -97,7 +97,8 @@ def grid_from_cloud(
     watch = Stopwatch(progress, read_seconds)
     check_length(cloud, settings)
     if settings.symmetry:
-        made = symmetric_grid(cloud, settings, progress=watch, keep_failed=keep_failed)
+        symmetric = symmetric_hexagons if settings.cells == "hexagon" else symmetric_grid
+        made = symmetric(cloud, settings, progress=watch, keep_failed=keep_failed)
         return made.replace(seconds=watch.seconds())
     refused: FrontError | None = None
     for effort in dict.fromkeys((settings.effort, LEAST_EFFORT)):  # more effort never gives less
@@ -154,6 +155,38 @@ def symmetric_grid(
     if keep_failed and isinstance(refused, CertificateError):
         return refused.grid
     raise refused
+
+
+def symmetric_hexagons(
+    cloud: PointCloud, settings: Settings, *, progress: Progress | None = None, keep_failed: bool = False
+) -> Grid:
+    """Return a grid of hexagons that keeps mirror planes or a rotation exactly: the dual of triangles that do.
+
+    Raises
+    ------
+    InputError
+        The scan is not symmetric within a tenth of a member.
+    FrontError
+        No grid passes the checks.
+    """
+    from .improve.mirrored import without_edge_lines
+    from .improve.symmetric import find_symmetry
+
+    rows = find_symmetry(np.asarray(cloud.points) + cloud.origin, settings).rows
+    asked = settings_of_triangles(settings).replace(cells="triangle", planar=False, symmetry=rows)
+    triangles = symmetric_grid(cloud, asked, progress=progress)
+    own = triangles.settings or asked
+    samples, boundary = find_boundary(sample_surface(cloud, own), own, progress=progress)
+    boundary, constraints = find_constraints(samples, boundary, own, ())
+    wanted = own.replace(
+        cells="hexagon", length=settings.length, fill_holes=settings.fill_holes, fixed=settings.fixed, planar=settings.planar
+    )  # fmt: skip
+    try:
+        return with_cells(without_edge_lines(triangles), samples, boundary, constraints, wanted, progress=progress)
+    except CertificateError as error:
+        if keep_failed:
+            return error.grid
+        raise
 
 
 def first_that_passes(

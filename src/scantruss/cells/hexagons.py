@@ -15,6 +15,7 @@ from ..constraints.fixed_nodes import check_positions
 from ..errors import FrontError
 from ..grid.grid import Grid
 from ..grid.panels import sides_of, sizes_of, table_of, triangles_of
+from ..improve.images import Images
 from ..improve.optimize import project_onto_scan
 from ..improve.sliding_nodes import with_boundary_members, with_line_sets
 from ..improve.working_mesh import WorkingMesh
@@ -82,10 +83,24 @@ def hexagons_of(
     if not (grid.topology.manifold and grid.topology.orientable):
         raise FrontError("the grid is no oriented manifold of triangles, which hexagons are made of", grid)
     positions = check_positions(settings.fixed, samples, settings.length)
-    grid = at_stops(grid, boundary.stops, settings.length)
-    grid = at_stops(grid, constraints.lines.stops, settings.length, np.unique(grid.lines))
+    images = Images.of_grid(grid)
     corners = np.concatenate([boundary.stops.reshape(-1, 3), constraints.lines.stops])
+
+    def with_corners(some: Grid) -> Grid:
+        some = at_stops(some, boundary.stops, settings.length)
+        return at_stops(some, constraints.lines.stops, settings.length, np.unique(some.lines))
+
+    if images.some:
+        kept = np.flatnonzero(_at(with_corners(grid).nodes, corners, 1e-6 * settings.length))
+        corners = grid.nodes[np.unique(images.of[:, kept])]
+        positions = images.of_places(positions, ON_SEAM * settings.length)
+    else:
+        grid = with_corners(grid)
     dual = dual_of(grid, corners, 1e-6 * settings.length)
+    found = images.of_nodes(dual.nodes, 1e-6 * settings.length)
+    if found is None:
+        raise FrontError("the hexagons would not be symmetric; leave --symmetry out", grid)
+    images = found
     first = grid.replace(
         nodes=dual.nodes, triangles=triangles_of(dual.nodes, dual.panels), panels=dual.panels,
         fixed=np.zeros(len(dual.nodes), np.bool_), lines=dual.lines, line_sets=(), deviation=None, desired=None,
@@ -95,6 +110,7 @@ def hexagons_of(
         surface = with_own_scratch(samples.surface)
         return WorkingMesh.from_grid(some, surface, boundary.curves, boundary.stops, settings.length, constraints.lines)
 
+    first = with_corners(first) if images.some else first
     first = with_fixed_nodes(first, opened(first), positions, settings.length)
 
     mesh, count = opened(first), len(dual.nodes)
@@ -112,9 +128,19 @@ def hexagons_of(
         deviation=mesh.deviation()[:count].copy(),
         desired=mesh.length * mesh.net.desired[:count] if mesh.graded else None,
     )
+    made = made_alike(made, images, opened)
     made = with_boundary_members(made, constraints.lines, settings.length)
     report(1.0)
     return with_line_sets(made, constraints.lines, settings.length).replace(before=before)
+
+
+def made_alike(grid: Grid, images: Images, opened: Callable[[Grid], WorkingMesh]) -> Grid:
+    """Return a grid whose nodes are exactly images of each other: each at the mean of what its images say."""
+    if not images.some or grid.deviation is None:
+        return grid
+    moved = grid.replace(nodes=images.alike(grid.nodes))
+    away = opened(moved).deviation()[: len(moved.nodes)]
+    return moved.replace(deviation=np.where(np.isnan(grid.deviation), np.nan, away))
 
 
 def with_fixed_nodes(grid: Grid, mesh: WorkingMesh, positions: np.ndarray, length: float) -> Grid:
@@ -211,9 +237,15 @@ def _kept_nodes(grid: Grid, seams: np.ndarray, corners: np.ndarray, near: float)
     meeting = np.bincount(grid.edges[seams].ravel(), minlength=len(grid.nodes))
     kept = set(np.flatnonzero((meeting > 0) & (meeting != 2)).tolist())
     for v in np.flatnonzero(meeting == 2).tolist():
-        if len(corners) and np.linalg.norm(corners - grid.nodes[v], axis=1).min() <= near:
+        if _at(grid.nodes[[v]], corners, near)[0]:
             kept.add(v)
     return sorted(kept)
+
+
+def _at(nodes: np.ndarray, places: np.ndarray, near: float) -> np.ndarray:
+    """Whether each node (V, 3) is at one of some places (K, 3)."""
+    apart = np.linalg.norm(nodes[:, None] - places, axis=2)
+    return np.asarray((apart <= near).any(axis=1))
 
 
 def even_out(mesh: WorkingMesh, grid: Grid, length: float) -> None:

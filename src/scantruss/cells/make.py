@@ -13,10 +13,11 @@ from ..errors import CertificateError
 from ..grid.certificate import Fault, place_of
 from ..grid.grid import Grid
 from ..grid.panels import PLANAR_ENOUGH, planarity_of
+from ..improve.images import Images
 from ..improve.working_mesh import WorkingMesh
 from ..runtime.progress import Progress
 from ..surface.scratch import with_own_scratch
-from .hexagons import TRIANGLE_MEMBER, hexagons_of
+from .hexagons import TRIANGLE_MEMBER, hexagons_of, made_alike
 
 TIMES_ROWS_TRIED = 5  # times that other starts of rows are tried where quads fail the checks
 
@@ -102,11 +103,17 @@ def _judged(
 
     surface = with_own_scratch(samples.surface)
     lines, length = constraints.lines, settings.length
+    images = Images.of_grid(made.replace(settings=settings))
     made = at_stops(made, boundary.stops, length)  # or corners, which were projected onto the scan, would slide
     made = at_stops(made, lines.stops, length, np.unique(made.lines))
-    mesh = WorkingMesh.from_grid(made, surface, boundary.curves, boundary.stops, length, lines)
+
+    def opened(some: Grid) -> WorkingMesh:
+        return WorkingMesh.from_grid(some, surface, boundary.curves, boundary.stops, length, lines)
+
+    mesh = opened(made)
     flat = make_planar(mesh, made)
     flat = flat.replace(deviation=mesh.deviation()[: len(made.nodes)].copy(), desired=made.desired, before=made.quality)
+    flat = made_alike(flat, images, opened)
     return certified_cells(flat.replace(settings=settings), samples, boundary, settings)
 
 

@@ -92,7 +92,8 @@ def make_planar(mesh: WorkingMesh, grid: Grid) -> Grid:
         ]
         matrix = vstack([rows for rows, _ in parts]).tocsc()
         aim = np.concatenate([values for _, values in parts])
-        nodes += splu((matrix.T @ matrix).tocsc()).solve(matrix.T @ aim).reshape(-1, 3)
+        move = splu((matrix.T @ matrix).tocsc()).solve(matrix.T @ aim).reshape(-1, 3)
+        nodes += np.where((kind >= AT_REST)[:, None], 0.0, move)  # fixed nodes and corners not even by a little
         slide_back(mesh, count)
         _bring_back(mesh, count, target)
         bent = _bent(nodes, panels)

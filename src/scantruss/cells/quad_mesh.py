@@ -15,7 +15,7 @@ from ..kernels.mesh.grid import INTERIOR, ON_CURVE
 from ..kernels.surface.local_surface import CENTRE, NEAREST_SAMPLE, fit_patch
 from .fine_mesh import ALONG, AT_REST_THERE, FREE
 
-QUAD_LENGTHS, QUAD_ANGLES = 3.0, 0.5  # weights of lengths and of angles in the energy
+QUAD_LENGTHS, QUAD_ANGLES = 3.0, 0.45  # weights of lengths and of angles in the energy
 QUAD_RELAXATION = 1.5  # over-relaxation
 GAIN_AT_REST = 2e-5  # gain of energy a node in a sweep below which nodes have settled
 QUADS_AT_NODE = 12  # quads at a node for which there is room at first

@@ -26,6 +26,7 @@ class Move(NamedTuple):
     touched: frozenset[int]  #: nodes whose quads change
     quads: dict[int, list[int]]  #: new corners of quads, none of one that goes; -1 is a new quad
     growth: int  #: quads more
+    penalty: int  #: growth of the sum of squared irregularities
     pair: tuple[int, int] = NO_PAIR  #: the node that stays and the one that goes or comes
     cut: frozenset[tuple[int, int]] = frozenset()  #: members of chains that go, the smaller node first
     tied: frozenset[tuple[int, int]] = frozenset()  #: those that come
@@ -106,7 +107,7 @@ class Moves:
         if around[0] & around[1] - {b, d}:
             return None
         changes = {p: [a if v == c else v for v in mesh.quads[p]] for p in sorted(mesh.at[c]) if p != q}
-        return Move("collapse", frozenset((a, b, c, d)), {**changes, q: []}, -1, (a, c))
+        return Move("collapse", frozenset((a, b, c, d)), {**changes, q: []}, -1, penalty, (a, c))
 
     def _merge_along(self, q: int, corners: list[int]) -> Move | None:
         """Merge two nodes of the boundary, of which the second slides, that have a node of one quad between them, which goes."""
@@ -136,7 +137,7 @@ class Moves:
         cut = frozenset(pair for pair in mesh.chains if c in pair or between in pair)
         ends = [v for pair in cut if c in pair for v in pair if v not in (c, between)]
         tied = frozenset((min(a, v), max(a, v)) for v in ends)
-        return Move("collapse", frozenset(corners), {**changes, q: []}, -1, (a, c), cut, tied)
+        return Move("collapse", frozenset(corners), {**changes, q: []}, -1, penalty, (a, c), cut, tied)
 
     def turn(self, a: int, b: int, way: int) -> Move | None:
         """Turn the member between two nodes in the six corners around it, one way (1) or the other (2)."""
@@ -163,7 +164,7 @@ class Moves:
         penalty = self.grows(a, -1) + self.grows(b, -1) + self.grows(ends[0], 1) + self.grows(ends[1], 1)
         if penalty > WORST_PENALTY:
             return None
-        return Move("turn", frozenset(ring), {one: ring[:4], two: [ring[3], ring[4], ring[5], ring[0]]}, 0)
+        return Move("turn", frozenset(ring), {one: ring[:4], two: [ring[3], ring[4], ring[5], ring[0]]}, 0, penalty)
 
     def splits(self, v: int) -> list[Move]:
         """Split a node inside in two, in each way that is not hopeless: a new node takes the quads between two neighbours."""
@@ -186,7 +187,7 @@ class Moves:
                     if corners[(corners.index(v) + 1) % 4] in taken:
                         changes[q] = [fresh if w == v else w for w in corners]
                 changes[-1] = [v, a, fresh, b]
-                found.append(Move("split", frozenset((v, a, b, fresh)), changes, 1, (v, fresh)))
+                found.append(Move("split", frozenset((v, a, b, fresh)), changes, 1, penalty, (v, fresh)))
         return found
 
     def after(self, move: Move) -> list[tuple[int, ...]]:

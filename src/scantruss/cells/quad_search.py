@@ -13,6 +13,9 @@ from .quad_moves import NO_PAIR, Move, Moves
 BARRIER = 0.6  # most energy that the first of two moves may cost
 LEAST_GAIN = 1e-3  # least energy that a move must gain
 MOST_PRICE = 0.25  # largest energy that an average quad is assumed to have
+# what the square of the members too many or too few at a node counts beside the energy, and counts once few are left
+IRREGULAR_PRICE, LAST_IRREGULAR_PRICE = 0.3, 0.12
+LED_IRREGULAR_PRICE = 0.1  # the same where rows follow the curvature, which turns them
 RENEWED_IN_SEARCH = (
     0.4  # distance of a node from the centre of its patch that gets it a new one after a round [members]
 )
@@ -27,22 +30,34 @@ class Made(NamedTuple):
     fresh: list[int]  #: quads that were not
     places: np.ndarray  #: (K,) nodes that may have moved
     was: np.ndarray  #: (K, 4) where they were: place and arc length on their curves
-    growth: float  #: of the energy
+    growth: float  #: of the energy and the price of irregular nodes
 
 
 class Search:
     """The search over a mesh of quads; what was tried in a round is tried again in the next only where the quads have changed."""
 
-    def __init__(self, mesh: QuadMesh) -> None:
+    def __init__(self, mesh: QuadMesh, irregular_price: float = IRREGULAR_PRICE) -> None:
         self.mesh, self.moves = mesh, Moves(mesh)
         self.price = 0.0  # energy of a quad more or less
+        self.irregular_price = irregular_price  # of a member too many or too few
         self.twice = False  # whether moves that cost energy are followed by another
         self.clock = 0
         self.stamp = [0] * len(mesh.at)  # when each node was last changed
         self.done: dict[tuple[int | str, ...], int] = {}  # when each move was last tried
 
+    def cost(self) -> float:
+        """Return the mean energy of a quad, with its share of the price of irregular nodes."""
+        mesh = self.mesh
+        charges = sum(self.moves.charge(v) for v, quads in enumerate(mesh.at) if quads)
+        return mesh.mean_energy() + self.irregular_price * charges / max(sum(map(bool, mesh.quads)), 1)
+
+    def refine(self) -> None:
+        """Try all moves again, and let irregular nodes be where they make lengths and angles even."""
+        self.irregular_price = min(self.irregular_price, LAST_IRREGULAR_PRICE)
+        self.done.clear()
+
     def make(self, move: Move, allowed: float) -> Made | None:
-        """Make a move and settle around it; None unless the energy grows by less than allowed."""
+        """Make a move and settle around it; None unless energy and price grow by less than allowed."""
         mesh = self.mesh
         kept, other = move.pair
         if move.kind == "split":
@@ -50,7 +65,7 @@ class Search:
             self.moves.at_boundary[other], self.moves.ideals[other] = False, 4
         join = move.pair if move.kind == "collapse" else NO_PAIR
         touched = sorted(v for v in move.touched if mesh.at[v])
-        price = move.growth * self.price
+        price = move.growth * self.price - move.penalty * self.irregular_price
         growth, count = mesh.try_quads(touched, move.quads, self.moves.at_boundary, allowed + price, join)
         if growth - price >= allowed:
             return None
@@ -128,7 +143,7 @@ class Search:
 
 
 def search_once(search: Search, *, twice: bool) -> float:
-    """Try the moves at all irregular nodes once and settle; returns the mean energy of a quad.
+    """Try the moves at all irregular nodes once and settle; returns the cost of a quad.
 
     twice : whether moves that cost energy are followed by another
     """
@@ -139,4 +154,4 @@ def search_once(search: Search, *, twice: bool) -> float:
     search.run()
     mesh.renew(RENEWED_IN_SEARCH)
     mesh.settle(SWEEPS_AFTER_ROUND)
-    return mesh.mean_energy()
+    return search.cost()

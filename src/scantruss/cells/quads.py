@@ -18,10 +18,11 @@ from ..runtime.progress import Progress
 from ..surface.scratch import with_own_scratch
 from .collapse import collapse
 from .fine_mesh import FineMesh, fine_mesh
+from .last_settling import settle_last, shortfall, wide_corners
 from .lead import Panels
 from .pairing import pairs_of
 from .quad_mesh import QuadMesh
-from .quad_search import Search, search_once
+from .quad_search import IRREGULAR_PRICE, LED_IRREGULAR_PRICE, Search, search_once
 from .row_lengths import row_lengths
 from .rows import Guide, RowStart, find_rows, lattice_places, offsets_of_edges, principal_directions, spread_rows
 from .stops import at_stops, slide_back
@@ -43,15 +44,29 @@ ROW_STARTS = (
     RowStart(1.5, 8.0, bent=True),
     RowStart(3.0, 2.0),
     RowStart(0.3, 2.0, bent=True),
+    RowStart(1.5, 1.0),
+    RowStart(3.0, 4.0, bent=True),
+    RowStart(0.3, 2.0),
+    RowStart(0.7, 0.5, bent=True),
+    RowStart(1.5, 8.0),
+    RowStart(6.0, 1.0, bent=True),
+    RowStart(3.0, 1.0),
+    RowStart(0.7, 2.0, bent=True),
+    RowStart(0.3, 8.0),
+    RowStart(3.0, 8.0, bent=True),
 )
-STARTS_TRIED = {"quick": 1, "normal": 4, "best": 10}  # of them, for each effort
-LEFT_BEFORE_ROUND = {"quick": (1,), "normal": (3, 1), "best": (10, 5, 2)}  # starts that are searched in each round
-MOST_ROUNDS = {"quick": 2, "normal": 6, "best": 12}  # of the search
-LITTLE_LEFT = 0.01  # mean energy of a quad below which no other start can be much better
-LEAST_FALL = 0.01  # share of the energy that a round must gain for another to follow
+STARTS_TRIED = {"quick": 1, "normal": 4, "best": 20}  # of them, for each effort
+LEFT_BEFORE_ROUND = {
+    "quick": (1,),
+    "normal": (2,),
+    "best": (10, 5, 4),
+}  # starts that are searched in each further round
+MOST_ROUNDS = {"quick": 1, "normal": 6, "best": 12}  # further rounds of the search
+LITTLE_LEFT = 0.05  # cost of a quad after a search below which no other start can be much better
+LEAST_FALL = 0.01  # share of the cost that a round must gain for another to follow
 PARTS = 3  # pieces that a member of the triangles becomes in the fine mesh
-FIRST_SWEEPS, LAST_SWEEPS_OF_QUADS = 25, 60  # most sweeps before the search and in the end
-FIRST_NEAR, LAST_NEAR = 0.4, 0.2  # distance of a node from the centre of its patch that gets it a new one [members]
+FIRST_SWEEPS = 25  # most sweeps before the search
+FIRST_NEAR = 0.4  # distance of a node from the centre of its patch that gets it a new one before the search [members]
 
 
 def quads_of(
@@ -96,19 +111,21 @@ def quads_of(
     coarse, fine = fine_mesh(grid, mesh, 1), fine_mesh(grid, mesh, PARTS)
     closer = [replace(each, length=each.length * row_lengths(mesh, each.nodes)) for each in (coarse, fine)]
     guide = principal_directions(mesh, len(coarse.nodes)) if settings.rows == "curvature" else None
+    price = IRREGULAR_PRICE if guide is None else LED_IRREGULAR_PRICE
     starts, tried = ROW_STARTS[begin : begin + STARTS_TRIED[settings.effort]], []
     for number, start in enumerate(starts):
-        report(0.5 * number / len(starts))
+        report(0.6 * number / len(starts))
         on = closer if start.bent else (coarse, fine)
         first, work = _laid(grid, on[0], on[1], start, guide, opened)
-        before = work.grid(first).quality
-        tried.append(_Tried(work.mean_energy(), number, first, work, before))
-        if tried[-1].energy < LITTLE_LEFT:
+        before, search = work.grid(first).quality, Search(work, price)
+        tried.append(_Tried(search_once(search, twice=False), number, first, search, before))
+        if tried[-1].cost < LITTLE_LEFT and not wide_corners(work):
             break
-    _, _, first, work, before = _best_of(tried, settings.effort, report)
-    work.renew(LAST_NEAR)
-    work.settle(LAST_SWEEPS_OF_QUADS)
-    last = work.grid(first)
+    tried = _best_of(tried, settings.effort, report)
+    for each in tried:
+        settle_last(each.search.mesh)
+    best = min(tried, key=lambda each: (wide_corners(each.search.mesh), shortfall(each.search), each.number))
+    last = best.search.mesh.grid(best.first)
     mesh = opened(last)
     project_onto_scan(mesh, samples, boundary=not settings.boundary)
     count = len(last.nodes)
@@ -119,31 +136,35 @@ def quads_of(
     )
     made = with_boundary_members(made, constraints.lines, settings.length)
     report(1.0)
-    return with_line_sets(made, constraints.lines, settings.length).replace(before=before)
+    return with_line_sets(made, constraints.lines, settings.length).replace(before=best.before)
 
 
 class _Tried(NamedTuple):
     """A start and what has become of it."""
 
-    energy: float  #: mean of the quads
+    cost: float  #: of a quad
     number: int
     first: Grid  #: before the search
-    work: QuadMesh
+    search: Search
     before: GridQuality
 
 
-def _best_of(tried: list[_Tried], effort: str, report: Callable[[float], None]) -> _Tried:
-    """Return the best of some starts after a search: fewer of them are searched in each round."""
-    left, searches = LEFT_BEFORE_ROUND[effort], {each.number: Search(each.work) for each in tried}
+def _best_of(tried: list[_Tried], effort: str, report: Callable[[float], None]) -> list[_Tried]:
+    """Return the best few of some starts that were searched once after further rounds: fewer of them are searched in each."""
+    left, refined = LEFT_BEFORE_ROUND[effort], effort != "best"
     for number in range(MOST_ROUNDS[effort]):
-        report(0.5 + 0.4 * number / MOST_ROUNDS[effort])
+        report(0.6 + 0.3 * number / MOST_ROUNDS[effort])
         tried = sorted(tried, key=lambda each: each[:2])[: left[min(number, len(left) - 1)]]
-        last = tried[0].energy
-        twice = number > 0 and effort != "quick"
-        tried = [each._replace(energy=search_once(searches[each.number], twice=twice)) for each in tried]
-        if min(tried, key=lambda each: each[:2]).energy > (1.0 - LEAST_FALL) * last:
+        last = tried[0].cost
+        tried = [each._replace(cost=search_once(each.search, twice=effort != "quick")) for each in tried]
+        stagnates = number >= len(left) - 1 and tried[0].cost > (1.0 - LEAST_FALL) * last
+        if stagnates and refined:
             break
-    return min(tried, key=lambda each: each[:2])
+        if stagnates:
+            for each in tried:
+                each.search.refine()
+            refined = True
+    return tried
 
 
 def _laid(

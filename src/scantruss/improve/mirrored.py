@@ -190,6 +190,26 @@ def with_panels(grid: Grid, nodes: np.ndarray, panels: np.ndarray, **others: Any
     return grid.replace(nodes=nodes, triangles=triangles_of(nodes, panels), panels=panels, **others)
 
 
+def without_edge_lines(grid: Grid) -> Grid:
+    """Return a grid without the lines along which its parts meet; other lines stay, those along the same members too."""
+    own = [line for line in grid.line_sets if not line.name.startswith(MIRROR_LINE)]
+    on_edges = _members_of([line for line in grid.line_sets if line.name.startswith(MIRROR_LINE)])
+    of_own = _members_of(own)
+    lines = [
+        pair for pair in np.sort(grid.lines, axis=1).tolist() if tuple(pair) in of_own or tuple(pair) not in on_edges
+    ]
+    return grid.replace(lines=np.array(lines, np.int64).reshape(-1, 2), line_sets=tuple(own))
+
+
+def _members_of(lines: list[LineSet]) -> set[tuple[int, int]]:
+    """Return the pairs of nodes, lower first, that follow each other on lines."""
+    found = set()
+    for line in lines:
+        nodes = line.nodes.tolist()
+        found |= {(min(a, b), max(a, b)) for a, b in zip(nodes, nodes[1:] + nodes[:1], strict=True)}
+    return found
+
+
 def images_of_members(lines: np.ndarray, number_of: np.ndarray) -> np.ndarray:
     """Return the images of members along lines (K, 2), each once; number_of: of each node in each image (M, V), -1 for none."""
     made = np.concatenate([each[lines] for each in number_of])

@@ -10,9 +10,16 @@ import numpy as np
 
 from ..errors import FrontError
 from ..grid.grid import Grid
-from ..grid.line_sets import LineSet
 from ..grid.panels import sides_of
-from .mirrored import MIRROR_LINE, ON_PLANE, beyond_axis, images_of_lines, images_of_members, section_of, with_panels
+from .mirrored import (
+    ON_PLANE,
+    beyond_axis,
+    images_of_lines,
+    images_of_members,
+    section_of,
+    with_panels,
+    without_edge_lines,
+)
 
 if TYPE_CHECKING:
     from ..scan.rotation import Rotation
@@ -167,31 +174,17 @@ def _all_parts(
     turns = np.array([rotation.matrix(k) for k in range(order)])
     made = np.einsum("vij,vj->vi", turns[times], nodes[source] - centre) + centre
     made[times == 0] = nodes[source[times == 0]]
-    own = [line for line in grid.line_sets if not line.name.startswith(MIRROR_LINE)]
-    on_seams = _members_of([line for line in grid.line_sets if line.name.startswith(MIRROR_LINE)])
-    of_own = _members_of(own)
-    lines = [
-        pair for pair in np.sort(grid.lines, axis=1).tolist() if tuple(pair) in of_own or tuple(pair) not in on_seams
-    ]
+    own = without_edge_lines(grid)
     return with_panels(
         grid,
         made,
         np.concatenate([number_of[k][kept] for k in range(order)]),
         fixed=grid.fixed[source],
-        lines=images_of_members(np.array(lines, np.int64).reshape(-1, 2), number_of),
-        line_sets=images_of_lines(own, number_of),
+        lines=images_of_members(own.lines, number_of),
+        line_sets=images_of_lines(own.line_sets, number_of),
         deviation=None if grid.deviation is None else grid.deviation[source],
         desired=None if grid.desired is None else grid.desired[source],
     )
-
-
-def _members_of(lines: list[LineSet]) -> set[tuple[int, int]]:
-    """Return the pairs of nodes, lower first, that follow each other on lines."""
-    found = set()
-    for line in lines:
-        nodes = line.nodes.tolist()
-        found |= {(min(a, b), max(a, b)) for a, b in zip(nodes, nodes[1:] + nodes[:1], strict=True)}
-    return found
 
 
 def _refuse(grid: Grid, node: int) -> None:

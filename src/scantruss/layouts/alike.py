@@ -13,9 +13,9 @@ from scipy.sparse.linalg import spsolve
 from ..errors import InputError
 from ..grid.alike import Alike
 from ..grid.grid import Grid
+from ..improve.images import Images
 from ..runtime.progress import Progress
 from .charts import Charts, shortened
-from .images import Images
 from .moved import moved_grid
 from .part_vectors import APART, PartVectors
 

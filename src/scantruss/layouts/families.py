@@ -14,9 +14,9 @@ from scipy.sparse.linalg import spsolve
 from ..errors import InputError
 from ..grid.alike import LENGTHS, Alike
 from ..grid.grid import Grid
+from ..improve.images import Images
 from ..runtime.progress import Progress
 from .charts import Charts, shortened
-from .images import Images
 from .moved import moved_grid
 
 FAMILY_ROUNDS = 300  #: of assignment and relaxation, each way but the last, which takes three times as many

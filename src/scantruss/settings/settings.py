@@ -83,8 +83,6 @@ class Settings(
             object.__setattr__(self, name, check_places(name, getattr(self, name)))
         object.__setattr__(self, "fixed_lines", tuple(check_line(line) for line in self.fixed_lines))
         object.__setattr__(self, "symmetry", check_symmetry(self.symmetry))
-        if self.symmetry and self.cells == "hexagon":
-            raise InputError("symmetry needs cells triangle or quad, got hexagon")
         object.__setattr__(self, "boundary", tuple(check_ring(ring) for ring in self.boundary))
         object.__setattr__(self, "line_names", check_names(self.line_names, len(self.fixed_lines)))
 

@@ -17,8 +17,8 @@ from ..geometry.vectors import Vector, cross, dot, row, subtract, vector_in
 from ..surface.local_surface import CENTRE, NORMAL, onto_patch
 
 FLAT = 4.0  # what a corner of 180 degrees costs beside the square of its cosine, by the eighth power of that
-SAG_WEIGHT = 400.0  # of the square of what a curve is farther from its member than is free
-SAG_FREE = 0.045  # distance of a curve from its member that costs nothing [members]
+SAG_WEIGHT = 700.0  # of the square of what a curve is farther from its member than is free
+SAG_FREE = 0.04  # distance of a curve from its member that costs nothing [members]
 SAG_SAMPLES = 7  # places on the curve at which it is measured
 SAG_STEP = 0.02  # way along the curve over which its change is found [members]
 QUAD_REACH = 0.8  # distance from the centre of its patch beyond which a node is not moved [member lengths]

@@ -11,7 +11,7 @@ from ..boundary.curves import Curves
 from .quads import energy_of_quads, settle_quads
 
 TRIAL_SWEEPS = 8  # most sweeps of a trial
-HOPELESS = ((1, 3.2), (2, 1.2), (4, 0.2))  # sweeps, and the energy over what is allowed that more of them never gained
+HOPELESS = ((1, 1.6), (2, 0.6), (4, 0.15))  # sweeps, and the energy over what is allowed that more of them never gained
 
 
 class QuadNet(NamedTuple):
