@@ -13,7 +13,7 @@ from scantruss.structure.checks import MemberChecks
 from scantruss.structure.groups import member_groups_of
 from scantruss.structure.modes import worst_buckling
 from scantruss.structure.report import report_structure
-from scantruss.structure.sizing import _few, candidates, size_members
+from scantruss.structure.sizing import SizingRound, _few, candidates, size_members, weight_curve
 from scantruss.structure.statics import factor_stiffness
 from scantruss.structure.truss import Truss
 
@@ -116,3 +116,15 @@ def test_what_cannot_be_sized_is_refused() -> None:
         size_members(shell(loads="snow:1000kN/m2"), 2)
     with pytest.raises(st.InputError, match=r"up to IPE270 .* \(IPE300 and others of class 4 in S355 are left out\)"):
         size_members(shell(section="IPE200", loads="snow:1000kN/m2"), 2)
+
+
+@pytest.mark.parametrize("factor", [8.0, 10.0, 20.0])
+def test_more_sections_are_never_heavier(factor: float) -> None:
+    checks = MemberChecks(buckling_factor=factor)
+    rounds: list[SizingRound] = []
+    truss = shell(loads="self,wind:5kN/m2:-1,half-snow:2kN/m2")
+    sized = [size_members(truss, count, checks, rounds if count == 3 else None) for count in (1, 2, 3)]
+    masses = [each.mass for each in sized]
+    assert masses[0] >= masses[1] >= masses[2]
+    assert rounds[-1].mass == pytest.approx(masses[2]) and len(sized[2].sections) <= 3
+    assert list(weight_curve(truss, sized[2], 3, checks).values()) == pytest.approx(masses)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -82,7 +83,7 @@ def size_members(
     All members begin with the lightest section. Each round solves the structure and gives every member the lightest section
     that resists its forces, never a lighter one than before; then the sections are made few, at the least mass, by heavier
     ones. Once all pass, the lightest sections grow until the structure buckles at no less than the factor of the checks (EN 1993-1-1
-    5.2.1(3)).
+    5.2.1(3)). Fewer sections are taken where they are lighter, as they may be where buckling decides.
 
     Parameters
     ----------
@@ -93,7 +94,7 @@ def size_members(
     checks : MemberChecks, optional
         Buckling length, partial factors.
     rounds : list of SizingRound, optional
-        Each round is added to it.
+        Each round of the structure that is returned is added to it.
     by : str
         "groups" or "rings": all members of one have the same section, see `member_groups_of`; "members": each has its own.
 
@@ -104,9 +105,29 @@ def size_members(
     """
     if count < 1:
         raise InputError(f"the number of different sections must be 1 or more, got {count}")
+    best: tuple[Truss, list[SizingRound]] | None = None
+    refused: InputError | None = None
+    for number in range(1, count + 1):
+        own: list[SizingRound] = []
+        try:
+            sized = _sized(truss, number, checks or MemberChecks(), own, by)
+        except InputError as error:
+            refused = error
+            continue
+        if best is None or sized.mass < best[0].mass:
+            best = sized, own
+    if best is None:
+        assert refused is not None
+        raise refused
+    if rounds is not None:
+        rounds += best[1]
+    return best[0]
+
+
+def _sized(truss: Truss, count: int, checks: MemberChecks, rounds: list[SizingRound], by: str) -> Truss:
+    """Return the structure with at most so many sections, whether or not fewer would be lighter."""
     chain = candidates(truss)
     chosen = np.zeros(len(truss.members), np.int64)
-    checks = checks or MemberChecks()
     group_of = np.arange(len(chosen)) if by == WAYS_TO_GROUP[0] else member_groups_of(truss, by)[1]
     for _ in range(ROUNDS):
         chosen = _few(chosen, truss.lengths, np.array([section.area for section in chain]), count)
@@ -120,9 +141,8 @@ def size_members(
             least = float(worst_buckling(factored, solution, 1).values.min(initial=np.inf))
             if least < checks.buckling_factor:
                 needed = _stiffer(chosen, chain, checks.buckling_factor / least)
-        if rounds is not None:
-            used = max(float(_use(truss, result, checks).max()) for result in judged)
-            rounds.append(SizingRound(truss.mass, len(np.unique(chosen)), used, least))
+        used = max(float(_use(truss, result, checks).max()) for result in judged)
+        rounds.append(SizingRound(truss.mass, len(np.unique(chosen)), used, least))
         if (needed <= chosen).all():
             kept, numbers = np.unique(chosen, return_inverse=True)
             return truss.replace(sections=tuple(chain[k] for k in kept), section_of=numbers.ravel().astype(np.int64))
@@ -155,7 +175,12 @@ def weight_curve(
     truss: Truss, sized: Truss, count: int, checks: MemberChecks | None = None, by: str = "members"
 ) -> dict[int, float]:
     """Return the mass [kg] of a structure sized with at most 1, 2, ..., `count` different sections; `sized` is the last of them."""
-    return {number: size_members(truss, number, checks, by=by).mass for number in range(1, count)} | {count: sized.mass}
+    curve: dict[int, float] = {}
+    for number in range(1, count):
+        with suppress(InputError):
+            mass = _sized(truss, number, checks or MemberChecks(), [], by).mass
+            curve[number] = min([mass, *curve.values()])
+    return curve | {count: sized.mass}
 
 
 def _judged(solution: Solution) -> list[CaseResult]:
