@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from .colours import DIMMED, FROM_GRID, PLAIN, colors_of_scan
-from .frame import DRAWN_EXTENT, SceneFrame, SectionPlane
+from .frame import SceneFrame, SectionPlane
 from .tone import to_be_seen
 
 if TYPE_CHECKING:
@@ -253,17 +253,6 @@ class Scene:
             self.lines("/selected/member", places[model.members[[number]]], color, WIDE)
         else:
             self.chain("/selected/panel", places[model.triangles[number]], True, SELECTED_COLOR, WIDE)
-
-    def arrows(self, name: str, places: np.ndarray, along: np.ndarray, color: tuple[int, int, int]) -> None:
-        """Draw arrows (N, 3) that end at places (N, 3)."""
-        if not len(places):
-            self.remove(name)
-            return
-        reach = DRAWN_EXTENT / 1000
-        self.api.add_arrows(
-            name, np.stack([places - along, places], axis=1).astype(np.float32), color,
-            shaft_radius=2 * reach, head_radius=5 * reach, head_length=12 * reach,
-        )  # fmt: skip
 
 
 def lit(colors: np.ndarray, gamma: float) -> np.ndarray:
