@@ -270,6 +270,8 @@ def test_a_person_makes_a_grid_and_a_structure(served: tuple[str, Session], tmp_
         page.click("text=Few different parts")
         field(page, "tolerance").fill("20%")
         page.click("button:has-text('Find the trade')")
+        found = until(lambda: session.state.trade is not None and session.state.trade.traded[-1].number <= 5)
+        assert found, (session.message, session.stage, session.state.is_live)
         page.click("svg [data-low='5'] rect")
         page.wait_for_selector("text=undo: 5 lengths")
         assert session.worker.wait(60) and session.grid.alike is not None and session.grid.alike.count == 5
