@@ -197,6 +197,15 @@ def until(holds: Callable[[], bool], seconds: float = 30.0) -> bool:
     return holds()
 
 
+def press(page: Any, selector: str, came: Callable[[], bool]) -> None:
+    """Click until something comes of it, three times at most: on a loaded machine a click is lost now and then."""
+    for _ in range(3):
+        page.click(selector)
+        if until(came, 15.0):
+            return
+    raise AssertionError(f"nothing comes of {selector}")
+
+
 def tab(page: Any, name: str) -> None:
     """Go to a step."""
     page.click(f"[role=tab]:has-text('{name}')")
@@ -252,7 +261,9 @@ def test_a_person_makes_a_grid_and_a_structure(served: tuple[str, Session], tmp_
         page.wait_for_selector("text=(quick, not saved)")
         length = float(f"{1.1 * session.settings.length:.3g}")
         field(page, "exactly").fill(f"{length:g}")
-        page.click("button:has-text('Generate')")  # at once: what was typed counts
+        press(
+            page, "button:has-text('Generate')", lambda: session.grid is not None and not session.state.is_live
+        )  # at once
         page.wait_for_selector("text=(quick, not saved)", state="detached")
         assert session.grid is not None and session.grid.settings is not None
         assert session.settings.length == session.grid.settings.length == length
@@ -269,10 +280,8 @@ def test_a_person_makes_a_grid_and_a_structure(served: tuple[str, Session], tmp_
         tab(page, "Design")
         page.click("text=Few different parts")
         field(page, "tolerance").fill("20%")
-        page.click("button:has-text('Find the trade')")
-        found = until(lambda: session.state.trade is not None and session.state.trade.traded[-1].number <= 5)
-        assert found, (session.message, session.stage, session.state.is_live)
-        page.click("svg [data-low='5'] rect")
+        press(page, "button:has-text('Find the trade')", lambda: session.state.trade is not None)
+        press(page, "svg [data-low='5'] rect", lambda: session.grid is not None and session.grid.alike is not None)
         page.wait_for_selector("text=undo: 5 lengths")
         assert session.worker.wait(60) and session.grid.alike is not None and session.grid.alike.count == 5
         page.click("button:has-text('Undo')")
