@@ -12,7 +12,7 @@ MOST_WEDGES = 50_000_000  #: pairs of lines at a node that are looked at
 
 
 class TooManyCyclesError(FormatError):
-    """Lines of which it cannot be told what panels they enclose."""
+    """Lines that may enclose other panels just as well, so that none are taken."""
 
 
 def place_of(point: np.ndarray) -> str:

@@ -1,4 +1,4 @@
-"""The trade of few different parts in a project file: the grid that it is of, and the places of the nodes of each that it offers."""
+"""The trade of few different parts in a project file: the grid that it is of, and the places of the nodes of each one in it."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def head_of_trade(trade: Trade, grid: Grid | None) -> bytes:
 
 
 def nodes_of_trade(trade: Trade) -> dict[str, np.ndarray]:
-    """Return the nodes (V, 3) of each grid that a trade offers, by their names."""
+    """Return the nodes (V, 3) of each grid of a trade, by their names."""
     return {f"nodes_{k}": each.grid.nodes for k, each in enumerate(trade.traded)}
 
 
