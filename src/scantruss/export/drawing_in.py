@@ -6,6 +6,7 @@ Lines on no panel, such as props, ties and what a space frame is made of, are it
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from itertools import combinations
 
 import numpy as np
 
@@ -162,8 +163,10 @@ def _grid(nodes: np.ndarray, panels: np.ndarray, origin: np.ndarray, drawing: Dr
 
 def _framework(grid: Grid, members: np.ndarray, name: str) -> Framework:
     """Return a grid with members (E, 2), of which some are sides of no panel; nodes without panels have normals that point up."""
-    triangle_sides = np.unique(np.sort(sides_of(grid.triangles), axis=1), axis=0)
-    across = triangle_sides[lines_on_no_panel(triangle_sides, grid.panel_table)]
+    table = grid.panel_table
+    corners = np.concatenate([table[:, pair] for pair in map(list, combinations(range(table.shape[1]), 2))])
+    corners = corners[(corners >= 0).all(axis=1)]
+    across = corners[lines_on_no_panel(corners, table)]
     if len(wrong := np.delete(members, lines_on_no_panel(members, across), axis=0)):
         where = place_of((grid.nodes + grid.origin)[wrong[0]].mean(axis=0))
         raise FormatError(f"{name} has lines across its faces, one at {where}; draw what they divide as faces")
