@@ -73,6 +73,7 @@ ENUMERATIONS = {
         "Origin": "From start|From end",
     },
     "StructuralPointSupportDef": {"Direction": "X|Y|Z|Rx|Ry|Rz"},
+    "ResultInternalForce1D": {"Result on": "On beam|On rib", "Result for": "Load case|Load combination"},
 }
 #: sheet -> column and its word, where another column is required
 CONDITIONS = {
@@ -93,6 +94,7 @@ CONDITIONS = {
     + [("Direction", axis, "Value 1 [kN/m]") for axis in "XYZ"],
     "StructuralCurveActionThermal": [("Force action", "On beam", "Member"), ("Variation", "Constant", "deltaT [°C]")],
     "StructuralPointSupportDef": [("Direction", axis, "Translation value [mm]") for axis in "XYZ"],
+    "ResultInternalForce1D": [("Result on", "On beam", "Member"), ("Result for", "Load case", "Load case")],
 }  # fmt: skip
 #: sheet -> columns that an edition before 2.2.0 had
 REMOVED = {"StructuralCurveMember": {"Begin node", "End node"}}
@@ -116,7 +118,9 @@ REQUIRED = {
     "StructuralCurveActionThermal": "Name|Force action|Variation|Load case|Coordinate definition|Origin|Start point [m]"
     "|End point [m]",
     "StructuralPointSupportDef": "Name|Point support|Direction|Load case",
+    "ResultInternalForce1D": "Result on|Result for|Section at [m]|Index|N [kN]|Vy [kN]|Vz [kN]|Mx [kNm]|My [kNm]|Mz [kNm]",
 }
+NAMELESS = {"ResultInternalForce1D"}  # sheets whose rows have neither name nor identifier
 MODEL = {
     "Global coordinate system": "Z vertical",
     "System of units": "Metric",
@@ -139,7 +143,8 @@ def read_saf(path: Path) -> Sheets:
         heads = [str(head) for head in rows[0]]
         assert len(set(heads)) == len(heads)
         found = [dict(zip(heads, row, strict=True)) for row in rows[1:]]
-        assert len({row["Name"] for row in found}) == len({row["Id"] for row in found}) == len(found)
+        if sheet.title not in NAMELESS:
+            assert len({row["Name"] for row in found}) == len({row["Id"] for row in found}) == len(found)
         assert not REMOVED.get(sheet.title, set()) & set(heads)
         for row in found:
             for column, words in ENUMERATIONS.get(sheet.title, {}).items():
@@ -280,6 +285,57 @@ def test_a_program_that_knows_the_guide_alone_finds_the_same_structure(others: d
     for row, each in zip(sheets["StructuralLoadCombination"], truss.combinations, strict=True):
         parts = [(row[f"Load case name {k}"], row[f"Load factor {k}"]) for k in range(1, len(each.factors) + 1)]
         assert row["Name"] == each.name and tuple(parts) == each.factors
+
+
+@pytest.mark.parametrize("joints", ["rigid", "pinned"])
+def test_forces_in_the_sheet_hold_every_node_by_the_signs_that_the_file_names(joints: str, tmp_path: Path) -> None:
+    truss = roof(joints=joints, loads="self,snow:1.5kN/m2")
+    solution = st.solve(truss)
+    st.write(solution, tmp_path / "a.saf.xlsx")
+    sheets = read_saf(tmp_path / "a.saf.xlsx")
+    assert (
+        "right-hand rule" in sheets["Project"][0]["Description"]
+        and "N in tension" in sheets["Project"][0]["Description"]
+    )
+    back = truss_of_saf(sheets)  # nodes, members, axes and loads as a program that knows the guide alone has them
+    number = {mark: k for k, mark in enumerate(back.node_marks)}
+    ends = {row["Name"]: [number[name] for name in row["Nodes"].split("; ")] for row in sheets["StructuralCurveMember"]}
+    axes = dict(zip(back.member_marks, back.axes, strict=True))
+    length = dict(zip(back.member_marks, back.lengths, strict=True))
+    rows = sheets["ResultInternalForce1D"]
+    assert len(rows) == 3 * len(ends) * len(truss.cases)
+    supported = {row["Node"] for row in sheets["StructuralPointSupport"]}
+    for case in back.cases:
+        left = np.zeros((len(number), 6))  # what loads, and members by their sheet, leave at each node
+        left += case.nodal if case.nodal is not None else 0.0
+        for row in (row for row in rows if row["Load case"] == case.name):
+            mark = row["Member"]
+            assert row["Section at [m]"] == pytest.approx((row["Index"] - 1) / 2 * length[mark])
+            if row["Index"] == 2:
+                continue
+            force = 1e3 * np.array([row["N [kN]"], row["Vy [kN]"], row["Vz [kN]"]]) @ axes[mark]
+            moment = 1e3 * np.array([row["Mx [kNm]"], row["My [kNm]"], row["Mz [kNm]"]]) @ axes[mark]
+            # the face that looks to the end belongs to the start: what it carries there comes from the node at the end,
+            # and the node at the start is pulled by what its own first face carries
+            node, sign = (ends[mark][0], 1.0) if row["Index"] == 1 else (ends[mark][1], -1.0)
+            left[node, :3] += sign * force
+            left[node, 3:] += sign * moment
+        free = [k for mark, k in number.items() if mark not in supported]
+        scale = 1e3 * max(abs(row["N [kN]"]) for row in rows if row["Load case"] == case.name)
+        shown = slice(0, 3 if joints == "pinned" else 6)
+        assert np.abs(left[free][:, shown]).max() < 1e-7 * scale
+    assert any(abs(row["My [kNm]"]) > 1e-6 for row in rows)
+
+
+def test_cases_that_no_longer_fit_a_sheet_are_left_out_whole(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from scantruss.export import saf
+
+    solution = st.solve(roof())
+    members = len(solution.truss.members)
+    monkeypatch.setattr(saf, "ROWS_OF_SHEET", 3 * members * 2)  # the header takes a row: one case fits
+    st.write(solution, tmp_path / "a.saf.xlsx")
+    rows = read_saf(tmp_path / "a.saf.xlsx")["ResultInternalForce1D"]
+    assert len(solution.cases) > 1 and {row["Load case"] for row in rows} == {solution.cases[0].name}
 
 
 @pytest.mark.parametrize("section", ["CHS114.3x5", "IPE200", "R100x200"])

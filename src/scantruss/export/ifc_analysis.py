@@ -13,7 +13,7 @@ import numpy as np
 from ..errors import FormatError
 from .bodies import Bodies
 from .ifc_file import Ifc, Profiles
-from .model import line_loads, temperatures
+from .model import STATIONS_WRITTEN, line_loads, temperatures
 from .part21 import Ref, Word, typed
 
 if TYPE_CHECKING:
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from ..structure.truss import LoadCase, Truss
 
 SOURCES = {"permanent": ".DEAD_LOAD_G.", "snow": ".SNOW_S.", "wind": ".WIND_W.", "temperature": ".TEMPERATURE_T."}
-STATIONS_WRITTEN = (0, 4, 8)  #: of those along a member: start, middle, end
 GLOBAL, LOCAL = Word(".GLOBAL_COORDS."), Word(".LOCAL_COORDS.")
 
 

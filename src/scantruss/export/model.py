@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from ..structure.truss import LoadCase, Truss
 
 
+STATIONS_WRITTEN = (0, 4, 8)  #: of those along a member, in files that hold forces: start, middle, end
 SYSTEM_UNITS = ("m", "foot")  #: of plane reference systems
 SYSTEM_CODE = re.compile(r"EPSG:\d{4,6}")
 

@@ -1,8 +1,9 @@
 """SAF, the Structural Analysis Format: a workbook that programs for structural analysis read (saf.guide, version 2.2.0).
 
 A sheet for each kind of object, named as the guide names it, with the guide's columns in its order; units are those of its table.
-Loads on areas are on nodes and members already. Results are left to the program that reads: the guide says the signs of forces in
-members by a picture alone, and has no sheets of displacements and reactions.
+Loads on areas are on nodes and members already. The guide has no sheets of displacements and reactions; of forces in members it
+says directions in words ("shear force in Z axis direction", "moment around Y axis", the right-hand rule everywhere) and the face of the
+cut in a picture alone, so the sheet of the project says it too.
 """
 
 from __future__ import annotations
@@ -15,12 +16,13 @@ import numpy as np
 
 from ..errors import FormatError
 from ..runtime.ours import MARK
-from .model import Model, line_loads, temperatures
+from .model import STATIONS_WRITTEN, Model, line_loads, temperatures
 from .style import FileStyle
-from .workbook import encode_workbook
+from .workbook import ROWS_OF_SHEET, encode_workbook
 
 if TYPE_CHECKING:
     from ..structure.catalogue import Material, Section
+    from ..structure.statics import CaseResult
     from ..structure.truss import LoadCase, Truss
 
 SAF_VERSION = "2.2.0"
@@ -77,6 +79,15 @@ SAF_SHEETS: dict[str, tuple[str, ...]] = {  # sheet -> columns
         "Name", "Point support", "Direction", "Translation value [mm]", "Rotation value [mrad]", "Load case", "Id",
     ),
 }  # fmt: skip
+SAF_RESULTS = "ResultInternalForce1D"
+SAF_RESULT_COLUMNS = (
+    "Result on", "Member", "Member Rib", "Result for", "Load case", "Load combination", "Combination key", "Section at [m]", "Index",
+    "N [kN]", "Vy [kN]", "Vz [kN]", "Mx [kNm]", "My [kNm]", "Mz [kNm]",
+)  # fmt: skip
+SAF_SIGNS = (
+    "Internal forces act on the face of a cut that looks from the start to the end of the member: N in tension, Vy and Vz along the "
+    "local axes, Mx, My and Mz about them by the right-hand rule are positive."
+)
 SAF_LOAD_TYPES = {"snow": "Snow", "wind": "Wind", "temperature": "Temperature"}  #: load types of variable actions
 SAF_MATERIALS = {"steel": "Steel", "aluminium": "Aluminium", "timber": "Timber"}
 I_SECTION = 1  #: form code of profiles that are symmetric about both axes, typically I sections
@@ -126,13 +137,17 @@ def encode_saf(model: Model, style: FileStyle) -> bytes:
             rows[name].append(row | {"Load case": case.name})
     widest = max((len(each.factors) for each in truss.combinations), default=0)
     more = [f"{word} {k + 1}" for k in range(widest) for word in ("Load factor", "Multiplier", "Load case name")]
-    sheets: dict[str, Any] = {"Project": [("Name", "ScanTruss")], "Model": _model(model)}
+    solved = () if model.solution is None else model.solution.cases
+    project = [("Name", "ScanTruss"), *([("Description", SAF_SIGNS)] if solved else [])]
+    sheets: dict[str, Any] = {"Project": project, "Model": _model(model)}
     for name, columns in SAF_SHEETS.items():
         if rows[name]:
             heads = (*columns, *more, "Id") if name == "StructuralLoadCombination" else columns
             for row in rows[name]:
                 row["Id"] = str(model.guid(name, row["Name"]))
             sheets[name] = [heads, *(map(row.get, heads) for row in rows[name])]
+    if solved:
+        sheets[SAF_RESULTS] = [SAF_RESULT_COLUMNS, *_forces(truss, solved)]
     return encode_workbook(sheets)
 
 
@@ -312,6 +327,16 @@ def _loads(truss: Truss, case: LoadCase) -> Iterator[tuple[str, SafRow]]:
             mark = truss.node_marks[node]
             moved = {"Direction": "XYZ"[axis], "Translation value [mm]": float(case.settlement[node, axis]) * 1e3}
             yield "StructuralPointSupportDef", {"Name": f"{mark} {'XYZ'[axis]}", "Point support": f"S {mark}", **moved}
+
+
+def _forces(truss: Truss, cases: tuple[CaseResult, ...]) -> Iterator[tuple[Any, ...]]:
+    """Yield the rows of the forces in the members, of as many load cases as a sheet holds."""
+    places = np.multiply.outer(truss.lengths, [0.0, 0.5, 1.0]).tolist()
+    for case in cases[: (ROWS_OF_SHEET - 1) // (len(STATIONS_WRITTEN) * len(places))]:
+        forces = (case.along[:, STATIONS_WRITTEN] / 1e3).tolist()
+        for mark, places_of_member, values in zip(truss.member_marks, places, forces, strict=True):
+            for index, (place, of_section) in enumerate(zip(places_of_member, values, strict=True), 1):
+                yield ("On beam", mark, None, "Load case", case.name, None, None, place, index, *of_section)
 
 
 def _directed(force: np.ndarray, value: str, vector: str) -> SafRow:
