@@ -19,8 +19,7 @@ LAYERS = (  # lowest first; a module imports from its own row and from rows abov
     ("boundary", "constraints"),
     ("grid",),  # the record, which front, improve and check share
     ("front",),
-    ("improve", "check"),
-    ("cells",),
+    ("improve", "check", "cells"),
     ("pipeline", "candidates", "attempts"),
     ("structure", "layouts", "schedules", "setout", "export", "sweep"),
     ("report", "studio", "cli", "__main__"),
