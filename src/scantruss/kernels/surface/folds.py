@@ -10,10 +10,13 @@ from __future__ import annotations
 import numpy as np
 
 from ...runtime.jit import kernel
-from ..geometry.vectors import Vector, along, dot, norm, row, subtract
-from .local_surface import Surface, flood
+from ..geometry.quadric import coefficients_from, height_at, slopes_at
+from ..geometry.vectors import Vector, along, cross, dot, norm, put_vector, row, subtract, vector_from, vector_in
+from .local_surface import CENTRE, HEIGHTS, NEAREST_SAMPLE, NORMAL, TANGENT, Surface, flood
 
-# columns 20 to 29 of a patch are the quadric: xx xy xz yy yz zz, its linear part, its constant
+SQUARES = 20  # first of six columns of a patch: the quadric of its planes, xx xy xz yy yz zz
+LINEAR = 26  # first of three columns: the linear part of that quadric
+CONSTANT = 29  # column of its constant
 FOLD_WEIGHT = 30  # column of the weight: 0 where the surface is smooth, 1 on a sharp fold
 DESIRED_LENGTH = 19  # column of the desired member length
 PLANES_REACH = 0.75  # samples farther from the node do not count [member lengths]
@@ -31,8 +34,8 @@ FACING_AWAY = -0.3  # samples that face farther away than this are another side'
 @kernel
 def add_fold(surface: Surface, patch: np.ndarray, members: float, strength: float) -> None:
     """Fill in the quadric of a patch from the samples within some member lengths of its middle; strength 1 is usual."""
-    place = (patch[0], patch[1], patch[2])
-    sample = int(patch[15])
+    place = vector_from(patch, CENTRE)
+    sample = int(patch[NEAREST_SAMPLE])
     facing = row(surface.normals, sample)
     local = surface.length * surface.field[sample]
     patch[FOLD_WEIGHT], patch[DESIRED_LENGTH] = 0.0, local
@@ -62,10 +65,10 @@ def add_fold(surface: Surface, patch: np.ndarray, members: float, strength: floa
     share = (spread - SMOOTH) / (SHARP - SMOOTH)
     if share <= 0.0:
         return
-    patch[20], patch[21], patch[22], patch[23], patch[24], patch[25] = (
-        xx / total, xy / total, xz / total, yy / total, yz / total, zz / total,
-    )  # fmt: skip
-    patch[26], patch[27], patch[28], patch[29] = bx / total, by / total, bz / total, c / total
+    put_vector(patch, SQUARES, (xx / total, xy / total, xz / total))
+    put_vector(patch, SQUARES + 3, (yy / total, yz / total, zz / total))
+    put_vector(patch, LINEAR, (bx / total, by / total, bz / total))
+    patch[CONSTANT] = c / total
     patch[FOLD_WEIGHT] = strength * min(share, 1.0)
 
 
@@ -75,21 +78,21 @@ def onto_crest(surface: Surface, patch: np.ndarray, place: Vector) -> Vector:
 
     The least of the quadric with CLING times the squared distance moved; the way is at most LONGEST_WAY_TO_CREST.
     """
-    local = surface.length * surface.field[int(patch[15])]
-    x, y, z = subtract(place, (patch[0], patch[1], patch[2]))
+    local = surface.length * surface.field[int(patch[NEAREST_SAMPLE])]
+    x, y, z = subtract(place, vector_from(patch, CENTRE))
     share = patch[FOLD_WEIGHT]
     if share <= 0.0:
         return place
-    a, b, c, d, e, f = patch[20] + CLING, patch[21], patch[22], patch[23] + CLING, patch[24], patch[25] + CLING
-    p = patch[26] - (patch[20] * x + patch[21] * y + patch[22] * z)
-    q = patch[27] - (patch[21] * x + patch[23] * y + patch[24] * z)
-    r = patch[28] - (patch[22] * x + patch[24] * y + patch[25] * z)
-    xx, xy, xz = d * f - e * e, c * e - b * f, b * e - c * d
-    det = a * xx + b * xy + c * xz
+    xx, xy, xz, yy, yz, zz = coefficients_from(patch, SQUARES)
+    bx, by, bz = vector_from(patch, LINEAR)
+    p, q, r = bx - (xx * x + xy * y + xz * z), by - (xy * x + yy * y + yz * z), bz - (xz * x + yz * y + zz * z)
+    a, b, c, d, e, f = xx + CLING, xy, xz, yy + CLING, yz, zz + CLING
+    first, second, third = d * f - e * e, c * e - b * f, b * e - c * d  # row of the adjugate
+    det = a * first + b * second + c * third
     step = (
-        share * (xx * p + xy * q + xz * r) / det,
-        share * (xy * p + (a * f - c * c) * q + (b * c - a * e) * r) / det,
-        share * (xz * p + (b * c - a * e) * q + (a * d - b * b) * r) / det,
+        share * (first * p + second * q + third * r) / det,
+        share * (second * p + (a * f - c * c) * q + (b * c - a * e) * r) / det,
+        share * (third * p + (b * c - a * e) * q + (a * d - b * b) * r) / det,
     )
     size = norm(step)
     if size > LONGEST_WAY_TO_CREST * local:
@@ -103,11 +106,15 @@ def fold_energy(patches: np.ndarray, v: int, x: float, y: float, z: float) -> fl
     if patches[v, FOLD_WEIGHT] == 0.0:
         return 0.0
     k = STRENGTH * patches[v, FOLD_WEIGHT] / patches[v, DESIRED_LENGTH] ** 2
-    x, y, z = x - patches[v, 0], y - patches[v, 1], z - patches[v, 2]
-    gx = patches[v, 20] * x + patches[v, 21] * y + patches[v, 22] * z - 2.0 * patches[v, 26]
-    gy = patches[v, 21] * x + patches[v, 23] * y + patches[v, 24] * z - 2.0 * patches[v, 27]
-    gz = patches[v, 22] * x + patches[v, 24] * y + patches[v, 25] * z - 2.0 * patches[v, 28]
-    q = k * (gx * x + gy * y + gz * z + patches[v, 29])
+    x, y, z = subtract((x, y, z), vector_in(patches, v, CENTRE))
+    xx, xy, xz, yy, yz, zz = coefficients_from(patches[v], SQUARES)
+    bx, by, bz = vector_in(patches, v, LINEAR)
+    gx, gy, gz = (
+        xx * x + xy * y + xz * z - 2.0 * bx,
+        xy * x + yy * y + yz * z - 2.0 * by,
+        xz * x + yz * y + zz * z - 2.0 * bz,
+    )
+    q = k * (gx * x + gy * y + gz * z + patches[v, CONSTANT])
     return q * FAR_ENERGY / (q + FAR_ENERGY) if q > 0.0 else 0.0
 
 
@@ -119,11 +126,13 @@ def fold_slope(patches: np.ndarray, v: int, x: float, y: float, z: float) -> tup
     k = 2.0 * STRENGTH * patches[v, FOLD_WEIGHT] / patches[v, DESIRED_LENGTH] ** 2
     f = 1.0 - fold_energy(patches, v, x, y, z) / FAR_ENERGY
     k *= f * f
-    x, y, z = x - patches[v, 0], y - patches[v, 1], z - patches[v, 2]
+    x, y, z = subtract((x, y, z), vector_in(patches, v, CENTRE))
+    xx, xy, xz, yy, yz, zz = coefficients_from(patches[v], SQUARES)
+    bx, by, bz = vector_in(patches, v, LINEAR)
     return (
-        k * (patches[v, 20] * x + patches[v, 21] * y + patches[v, 22] * z - patches[v, 26]),
-        k * (patches[v, 21] * x + patches[v, 23] * y + patches[v, 24] * z - patches[v, 27]),
-        k * (patches[v, 22] * x + patches[v, 24] * y + patches[v, 25] * z - patches[v, 28]),
+        k * (xx * x + xy * y + xz * z - bx),
+        k * (xy * x + yy * y + yz * z - by),
+        k * (xz * x + yz * y + zz * z - bz),
     )
 
 
@@ -166,13 +175,12 @@ def chord_slope(patches: np.ndarray, v: int, w: int, x: float, y: float, z: floa
 @kernel
 def _height(patches: np.ndarray, v: int, x: float, y: float, z: float) -> tuple[float, float, float, float]:
     """Height of a place over the patch of node v, and its gradient."""
-    p = patches[v]
-    x, y, z = x - p[0], y - p[1], z - p[2]
-    nx, ny, nz, ux, uy, uz = p[3], p[4], p[5], p[6], p[7], p[8]
-    vx, vy, vz = ny * uz - nz * uy, nz * ux - nx * uz, nx * uy - ny * ux
-    a, b = x * ux + y * uy + z * uz, x * vx + y * vy + z * vz
-    h = x * nx + y * ny + z * nz
-    h -= p[9] + a * (p[10] + a * p[12] + b * p[13]) + b * (p[11] + b * p[14])
-    s, t = p[10] + 2.0 * a * p[12] + b * p[13], p[11] + 2.0 * b * p[14] + a * p[13]
-    f = 1.0 / (1.0 + s * s + t * t)  # near to the distance where the patch is steep
-    return f**0.5 * h, f**0.5 * (nx - s * ux - t * vx), f**0.5 * (ny - s * uy - t * vy), f**0.5 * (nz - s * uz - t * vz)
+    d = subtract((x, y, z), vector_in(patches, v, CENTRE))
+    normal, along_u = vector_in(patches, v, NORMAL), vector_in(patches, v, TANGENT)
+    along_v, heights = cross(normal, along_u), coefficients_from(patches[v], HEIGHTS)
+    a, b = dot(d, along_u), dot(d, along_v)
+    h = dot(d, normal) - height_at(heights, a, b)
+    s, t = slopes_at(heights, a, b)
+    f = (1.0 / (1.0 + s * s + t * t)) ** 0.5  # near to the distance where the patch is steep
+    (nx, ny, nz), (ux, uy, uz), (vx, vy, vz) = normal, along_u, along_v
+    return f * h, f * (nx - s * ux - t * vx), f * (ny - s * uy - t * vy), f * (nz - s * uz - t * vz)
