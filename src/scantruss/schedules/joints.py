@@ -9,6 +9,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..grid.marks import member_marks, node_marks, panel_marks
+from ..grid.panels import area_vectors_of, inner_angles_of
 from ..layouts.framework import Framework
 
 if TYPE_CHECKING:
@@ -54,20 +55,21 @@ def angle_between(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def node_normals(grid: Grid) -> np.ndarray:
-    """Return the unit normal of each node (V, 3), NaN where there is no triangle; of layers those of the surface.
+    """Return the unit normal of each node (V, 3), NaN where there is no panel; of layers those of the surface.
 
-    The mean of the normals of its triangles, weighted by their angles there (Thuermer and Wuethrich, Computing vertex normals from
-    polygonal facets, Journal of Graphics Tools 3(1), 1998): it does not depend on how the surface is cut into triangles.
+    The mean of the normals of its panels, weighted by their angles there (Thuermer and Wuethrich, Computing vertex normals from
+    polygonal facets, Journal of Graphics Tools 3(1), 1998): it does not depend on how panels are cut into triangles.
     """
     if isinstance(grid, Framework):
         return grid.own_normals
-    a, b, c = (grid.nodes[grid.triangles[:, k]] for k in range(3))
-    normal = np.cross(b - a, c - a)
-    with np.errstate(invalid="ignore"):  # NaN for a node without triangles
+    panels = grid.panel_table
+    there = panels >= 0
+    angles = grid.corner_angles if grid.panels is None else inner_angles_of(grid.nodes, panels)
+    with np.errstate(invalid="ignore"):  # NaN for a panel without area, and for a node without panels
+        normal = area_vectors_of(grid.nodes, panels)
         normal /= np.linalg.norm(normal, axis=1, keepdims=True)
         total = np.zeros((len(grid.nodes), 3))
-        for k in range(3):
-            np.add.at(total, grid.triangles[:, k], grid.angles[:, k, None] * normal)
+        np.add.at(total, panels[there], (angles[:, :, None] * normal[:, None])[there])
         return total / np.linalg.norm(total, axis=1, keepdims=True)
 
 

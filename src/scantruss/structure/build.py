@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..grid.marks import member_marks, node_marks, numbered
-from ..grid.panels import first_triangles, turned_panels
+from ..grid.panels import area_vectors_of, first_triangles, panel_of_triangles, turned_panels
 from ..layouts.double_layer import DoubleLayer
 from ..layouts.double_layer import double_layer as make_double_layer
 from ..layouts.framework import Framework
@@ -64,20 +64,20 @@ def truss_of_grid(
     lengths = np.linalg.norm(nodes[members[:, 0]] - nodes[members[:, 1]], axis=1)
     if lengths.min() <= 0:
         raise InputError(f"member {marks[int(lengths.argmin())]} has no length; a structure needs nodes apart")
-    areas = area_vectors(nodes, triangles)
     turned = turned_pieces(nodes, triangles)  # a shell is loaded from above
+    panels, normals_of_panels = _turned_panels(grid, nodes, turned)
     triangles = np.where(turned[:, None], triangles[:, ::-1], triangles)
-    areas = np.where(turned[:, None], -areas, areas)
     node_normals = np.zeros_like(nodes)
-    for corner in triangles.T:
-        np.add.at(node_normals, corner, areas)
+    for corner in panels.T:
+        np.add.at(node_normals, corner[corner >= 0], normals_of_panels[corner >= 0])
+    of_triangle = slice(None) if grid.panels is None else panel_of_triangles(panels)
     truss = Truss(
         nodes=nodes,
         members=members,
         triangles=triangles,
-        panels=None if grid.panels is None else turned_panels(grid.panels, turned[first_triangles(grid.panels)]),
+        panels=None if grid.panels is None else panels,
         node_normals=units(node_normals),
-        member_normals=units(_at_members(grid, units(areas))),
+        member_normals=units(_at_members(grid, units(normals_of_panels)[of_triangle])),
         sections=(find_section(section) if isinstance(section, str) else section,),
         section_of=np.zeros(len(members), np.int64),
         material=find_material(material) if isinstance(material, str) else material,
@@ -170,6 +170,18 @@ def _joints(joints: str | float) -> tuple[bool, float]:
     if not stiffness > 0:
         raise InputError(f"joints must be rigid, pinned or a rotational stiffness in Nm/rad, got {joints!r}")
     return False, stiffness
+
+
+def _turned_panels(grid: Grid, nodes: np.ndarray, turned: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the panels (P, K), those of the turned triangles (T,) the other way round, and their area vectors (P, 3).
+
+    A panel that is not plane has one normal however it is cut into triangles, so mirrored members get mirrored axes.
+    """
+    if grid.panels is None:
+        areas = area_vectors(nodes, grid.triangles)
+        return np.asarray(grid.triangles, np.int64), np.where(turned[:, None], -areas, areas)
+    panels = turned_panels(grid.panels, turned[first_triangles(grid.panels)])
+    return panels, area_vectors_of(nodes, panels)
 
 
 def _at_members(grid: Grid, normals: np.ndarray) -> np.ndarray:
