@@ -31,9 +31,9 @@ class FineMesh:
     @cached_property
     def edges(self) -> np.ndarray:
         """(E, 2) all edges, smaller node first, sorted."""
-        ends = np.concatenate([self.triangles[:, [0, 1]], self.triangles[:, [1, 2]], self.triangles[:, [2, 0]]])
-        found: np.ndarray = np.unique(np.sort(ends, axis=1), axis=0)
-        return found
+        ends, others = self.triangles.ravel(), self.triangles[:, [1, 2, 0]].ravel()
+        key = np.unique(np.minimum(ends, others) * len(self.nodes) + np.maximum(ends, others))
+        return np.stack(np.divmod(key, len(self.nodes)), axis=1)
 
     @cached_property
     def normals(self) -> np.ndarray:

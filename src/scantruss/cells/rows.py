@@ -131,8 +131,9 @@ def _passage(
     """Return the right angles from the axes at one place to those at another, and the way from the other to the one [members]."""
     x, y = dots(along, other_along), dots(along, other_across)
     turn = np.rint(np.arctan2(y, x) / (math.pi / 2)).astype(np.int64) % 4
-    u = 0.5 * (dots(way, along) + dots(way, _turned(other_along, other_across, turn)))
-    v = 0.5 * (dots(way, across) + dots(way, _turned(other_along, other_across, turn + 1)))
+    p, q = dots(way, other_along), dots(way, other_across)
+    u = 0.5 * (dots(way, along) + np.choose(turn, [p, q, -p, -q]))
+    v = 0.5 * (dots(way, across) + np.choose(turn, [q, -p, -q, p]))
     return turn, np.stack([u, v], axis=1) / (0.5 * (length + other_length))[:, None]
 
 
@@ -142,12 +143,6 @@ def _frames(normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     first = np.cross(axis, normals)
     first /= np.linalg.norm(first, axis=1, keepdims=True)
     return first, np.cross(normals, first)
-
-
-def _turned(along: np.ndarray, across: np.ndarray, turn: np.ndarray) -> np.ndarray:
-    """Return the first axes turned by right angles."""
-    turn = (turn % 4)[:, None]
-    return np.where(turn % 2 == 0, along, across) * np.where(turn < 2, 1.0, -1.0)
 
 
 def _directions(
