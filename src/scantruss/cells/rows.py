@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import coo_matrix, csc_matrix, identity
+from scipy.sparse import coo_matrix, csc_matrix, diags
 from scipy.sparse.linalg import SuperLU, splu
 from scipy.spatial import cKDTree
 
@@ -180,19 +180,19 @@ def _directions(
         aim, strength = np.where(led, aim, wanted), np.where(led, strength, share**2 * guide.weight)
     if not strength.any():
         aim[0], strength[0] = 1.0, 1e-3
-    pull = csc_matrix((strength.astype(complex), (np.arange(count), np.arange(count))), shape=(count, count))
-    field = _factored(laplacian + pull + 1e-9 * identity(count)).solve(strength * aim)
+    field = _factored(laplacian, strength + 1e-9).solve(strength * aim)
     rate = 1.0 / diffusion
-    solver = _factored(laplacian + pull + rate * identity(count))
+    solver = _factored(laplacian, strength + rate)
     for _ in range(DIRECTION_TURNS):
         unit = field / np.maximum(np.abs(field), 1e-300)
         field = solver.solve(strength * aim + rate * unit)
     return np.angle(field) / 4
 
 
-def _factored(matrix: csc_matrix) -> SuperLU:
-    """Return the factors of a positive definite matrix, which needs no pivots."""
-    return splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+def _factored(matrix: csc_matrix, pull: np.ndarray) -> SuperLU:
+    """Return the factors of a matrix with more on its diagonal, which is positive definite and needs no pivots."""
+    pulled = matrix + diags(pull, format="csc")
+    return splu(pulled, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
 
 
 def _distances_from(mesh: FineMesh, some: np.ndarray) -> np.ndarray:
@@ -238,10 +238,9 @@ def _lattice(
     aim = np.zeros((count, 2, 2))
     aim[:, :, 0] = 1.0
     held = pull * aim.ravel()
-    extra = csc_matrix((pull, (np.arange(4 * count), np.arange(4 * count))), shape=matrix.shape)
-    field = _factored(matrix + extra + 1e-6 * identity(4 * count)).solve(held)
+    field = _factored(matrix, pull + 1e-6).solve(held)
     rate = 1.0 / diffusion
-    solver = _factored(matrix + extra + rate * identity(4 * count))
+    solver = _factored(matrix, pull + rate)
     for _ in range(LATTICE_TURNS):
         pairs = field.reshape(-1, 2)
         unit = pairs / np.maximum(np.linalg.norm(pairs, axis=1, keepdims=True), 1e-300)
