@@ -30,7 +30,7 @@ class Evenness:
     angles: float  #: share of the corner angles that are right
     regular: float  #: share of inner nodes with four members, or three
     boundary: float  #: farthest that the boundary of the scan is from that of the grid [members]
-    corners: float  #: farthest that a corner is from a node [members]
+    corners: float  #: farthest that a corner is from a node, along the surface: the curves are smooth across it [members]
     planarity: float
     from_scan: float  #: farthest node from the scan [members]
     seconds: float  #: of the processor, triangles included
@@ -52,6 +52,16 @@ def distance_to_chains(points: np.ndarray, starts: np.ndarray, ends: np.ndarray)
     return np.asarray(np.linalg.norm(points[:, None] - (starts + share[..., None] * way), axis=2).min(axis=1))
 
 
+def distance_to_node(place: np.ndarray, grid: Grid) -> float:
+    """Return the distance of a place (3,) from the nearest node, but for what is along the normal of the grid there."""
+    v = int(np.linalg.norm(grid.nodes - place, axis=1).argmin())
+    a, b, c = (grid.nodes[corner] for corner in grid.triangles[(grid.triangles == v).any(axis=1)].T)
+    normal = np.cross(b - a, c - a).sum(axis=0)
+    normal /= np.linalg.norm(normal)
+    away = place - grid.nodes[v]
+    return float(np.linalg.norm(away - (away @ normal) * normal))
+
+
 def evenness(grid: Grid, cloud: PointCloud, settings: st.Settings, seconds: float, alone: float) -> Evenness:
     """Measure a grid against the boundary curves of its scan."""
     plain = settings.replace(cells="triangle", planar=False, rows="boundary")
@@ -59,7 +69,7 @@ def evenness(grid: Grid, cloud: PointCloud, settings: st.Settings, seconds: floa
     rim = grid.edges[grid.edge_uses == 1]
     starts, ends = grid.nodes[rim[:, 0]], grid.nodes[rim[:, 1]]
     off = [distance_to_chains(loop.points, starts, ends).max() for loop in boundary.loops]
-    corners = [np.linalg.norm(grid.nodes - place, axis=1).min() for place in boundary.corners]
+    corners = [distance_to_node(place, grid) for place in boundary.corners]
     low, high = RIGHT if grid.cells == "quad" else SIXTH
     angles = grid.corner_angles[np.isfinite(grid.corner_angles)]
     found = grid.quality

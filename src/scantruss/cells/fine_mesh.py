@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -27,22 +26,8 @@ class FineMesh:
     length: np.ndarray  #: (F,) desired member length [scan unit]
     owners: np.ndarray  #: (F, 3) int64 corners of the triangle of the grid that each node lies in
     shares: np.ndarray  #: (F, 3) their shares in its place
-
-    @cached_property
-    def edges(self) -> np.ndarray:
-        """(E, 2) all edges, smaller node first, sorted."""
-        ends = np.concatenate([self.triangles[:, [0, 1]], self.triangles[:, [1, 2]], self.triangles[:, [2, 0]]])
-        found: np.ndarray = np.unique(np.sort(ends, axis=1), axis=0)
-        return found
-
-    @cached_property
-    def normals(self) -> np.ndarray:
-        """(F, 3) unit normals, means over the triangles by area."""
-        a, b, c = (self.nodes[corner] for corner in self.triangles.T)
-        areas, total = np.cross(b - a, c - a), np.zeros_like(self.nodes)
-        for corner in self.triangles.T:
-            np.add.at(total, corner, areas)
-        return total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-300)
+    edges: np.ndarray  #: (E, 2) all edges, smaller node first, sorted
+    normals: np.ndarray  #: (F, 3) unit normals, means over the triangles by area
 
 
 def fine_mesh(grid: Grid, mesh: WorkingMesh, parts: int) -> FineMesh:
@@ -117,8 +102,25 @@ def fine_mesh(grid: Grid, mesh: WorkingMesh, parts: int) -> FineMesh:
     ]
     along = np.concatenate([edges[chain][:, [0]], on_edge[chain], edges[chain][:, [1]]], axis=1)
     chains = np.stack([along[:, :-1].ravel(), along[:, 1:].ravel()], axis=1)
-    desired = mesh.length * net.desired[own]
-    return FineMesh(nodes, np.concatenate(small), held, chains, desired, owners, shares)
+    desired, all_small = mesh.length * net.desired[own], np.concatenate(small)
+    return FineMesh(
+        nodes, all_small, held, chains, desired, owners, shares, _edges(all_small, len(nodes)), _normals(nodes, all_small)
+    )  # fmt: skip
+
+
+def _edges(triangles: np.ndarray, count: int) -> np.ndarray:
+    """Return the edges of triangles of `count` nodes (E, 2)."""
+    starts, ends = triangles.ravel(), triangles[:, [1, 2, 0]].ravel()
+    key = np.unique(np.minimum(starts, ends) * count + np.maximum(starts, ends))
+    return np.stack(np.divmod(key, count), axis=1)
+
+
+def _normals(nodes: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Return the unit normal at each node (F, 3)."""
+    a, b, c = (nodes[corner] for corner in triangles.T)
+    areas, at = np.tile(np.cross(b - a, c - a), (3, 1)), triangles.T.ravel()
+    total = np.stack([np.bincount(at, areas[:, k], len(nodes)) for k in range(3)], axis=1)
+    return total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-300)
 
 
 def _onto_curves(nodes: np.ndarray, some: np.ndarray, mesh: WorkingMesh, grid: Grid) -> None:

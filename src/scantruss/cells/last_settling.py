@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from ..check.limits import WARN_WIDE
@@ -14,34 +16,56 @@ LAST_NEAR = 0.2  # distance of a node from the centre of its patch that gets it 
 # weights of angles in the energy that are tried in turn after the usual one
 LOWER_ANGLES = (0.4, 0.36, 0.32, 0.285, 0.255, 0.225, 0.2, 0.18)
 ASKEW = 20.0  # angle by which a corner that is not near a right angle is off it [degree]
-MORE_ASKEW = 1.2  # share of the corners askew before that may be so after
-MOST_ASKEW = 0.049  # largest share of all corners for which that holds
+MORE_ASKEW = 1.2  # share of the corners askew before that may be so after where lengths are as even as is aimed at
+MOST_ASKEW = 0.049  # largest share of all corners that may be
 AIMS = (0.075, 0.05, 0.08)  # of the CV of lengths, the share of corners askew and that of irregular nodes inside
 
 
 def settle_last(mesh: QuadMesh) -> None:
-    """Settle all nodes, with a lower and lower weight of angles as long as hardly more corners get askew."""
+    """Settle all nodes, with a lower and lower weight of angles as long as hardly more corners get askew.
+
+    Where lengths are less even than is aimed at, all corners may be that the aim allows.
+    """
     _settle(mesh, QUAD_ANGLES)
     quads = mesh.live()
-    allowed = min(MORE_ASKEW * _askew(mesh, quads), MOST_ASKEW * quads.size)
+    most = MOST_ASKEW * quads.size
+    few = min(MORE_ASKEW * _askew(mesh, quads), most)
+    last = QUAD_ANGLES
     for angles in LOWER_ANGLES:
-        before = mesh.nodes.copy(), mesh.arc.copy(), mesh.patches.copy()
-        _settle(mesh, angles)
-        if _askew(mesh, quads) > allowed:
-            mesh.nodes[:], mesh.arc[:], mesh.patches[:] = before
+        uneven = _unevenness(mesh, quads) > AIMS[0]
+        if not _lowered(mesh, quads, angles, most if uneven else few):
+            if uneven:
+                _lowered(mesh, quads, math.sqrt(angles * last), most)
             return
+        last = angles
+
+
+def _lowered(mesh: QuadMesh, quads: np.ndarray, angles: float, allowed: float) -> bool:
+    """Settle all nodes with a weight of angles, unless more corners get askew than allowed; returns whether that is kept."""
+    before = mesh.nodes.copy(), mesh.arc.copy(), mesh.patches.copy()
+    _settle(mesh, angles)
+    if _askew(mesh, quads) <= allowed:
+        return True
+    mesh.nodes[:], mesh.arc[:], mesh.patches[:] = before
+    return False
+
+
+def _unevenness(mesh: QuadMesh, quads: np.ndarray) -> float:
+    """Return the CV of the lengths of the members, each over its desired length."""
+    ends, others = quads.ravel(), np.roll(quads, -1, axis=1).ravel()
+    key = np.unique(np.minimum(ends, others) * len(mesh.nodes) + np.maximum(ends, others))
+    a, b = np.divmod(key, len(mesh.nodes))
+    lengths = np.linalg.norm(mesh.nodes[a] - mesh.nodes[b], axis=1) / (0.5 * (mesh.desired[a] + mesh.desired[b]))
+    return float(lengths.std() / lengths.mean())
 
 
 def shortfall(search: Search) -> float:
     """Return the largest of the CV of lengths, the share of corners askew and that of irregular nodes inside, each over its aim."""
     mesh, moves = search.mesh, search.moves
     quads = mesh.live()
-    sides = np.unique(np.sort(np.stack([quads, np.roll(quads, -1, axis=1)], axis=2).reshape(-1, 2), axis=1), axis=0)
-    lengths = np.linalg.norm(mesh.nodes[sides[:, 0]] - mesh.nodes[sides[:, 1]], axis=1)
-    lengths = lengths / mesh.desired[sides].mean(axis=1)
     inside = [v for v, own in enumerate(mesh.at) if own and not moves.at_boundary[v]]
     irregular = sum(moves.charge(v) > 0 for v in inside) / max(len(inside), 1)
-    found = float(lengths.std() / lengths.mean()), _askew(mesh, quads) / quads.size, irregular
+    found = _unevenness(mesh, quads), _askew(mesh, quads) / quads.size, irregular
     return max(value / aim for value, aim in zip(found, AIMS, strict=True))
 
 

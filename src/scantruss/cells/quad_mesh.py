@@ -87,11 +87,7 @@ class QuadMesh:
         begin = np.searchsorted(flat[order], some)
         end = np.searchsorted(flat[order], some, side="right")
         start = np.concatenate([[0], np.cumsum(end - begin)])
-        of = (
-            np.concatenate([order[b:e] for b, e in zip(begin.tolist(), end.tolist(), strict=True)]) // 4
-            if len(some)
-            else np.zeros(0, np.int64)
-        )
+        of = order[np.isin(flat[order], some)] // 4
         settle_quads(
             self.nodes, quads, share, of, start, some, self.held, self.curve, self.arc, self.patches, self.curves,
             self.desired, lengths, angles, sweeps, stride, enough,

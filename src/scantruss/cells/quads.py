@@ -10,7 +10,6 @@ import numpy as np
 
 from ..grid.grid import Grid
 from ..grid.panels import triangles_of
-from ..grid.quality import GridQuality
 from ..improve.optimize import project_onto_scan
 from ..improve.sliding_nodes import with_boundary_members, with_line_sets
 from ..improve.working_mesh import WorkingMesh
@@ -117,7 +116,7 @@ def quads_of(
         report(0.6 * number / len(starts))
         on = closer if start.bent else (coarse, fine)
         first, work = _laid(grid, on[0], on[1], start, guide, opened)
-        before, search = work.grid(first).quality, Search(work, price)
+        before, search = work.grid(first), Search(work, price)
         tried.append(_Tried(search_once(search, twice=False), number, first, search, before))
         if tried[-1].cost < LITTLE_LEFT and not wide_corners(work):
             break
@@ -136,7 +135,7 @@ def quads_of(
     )
     made = with_boundary_members(made, constraints.lines, settings.length)
     report(1.0)
-    return with_line_sets(made, constraints.lines, settings.length).replace(before=best.before)
+    return with_line_sets(made, constraints.lines, settings.length).replace(before=best.before.quality)
 
 
 class _Tried(NamedTuple):
@@ -146,15 +145,19 @@ class _Tried(NamedTuple):
     number: int
     first: Grid  #: before the search
     search: Search
-    before: GridQuality
+    before: Grid  #: after the first settling
 
 
 def _best_of(tried: list[_Tried], effort: str, report: Callable[[float], None]) -> list[_Tried]:
-    """Return the best few of some starts that were searched once after further rounds: fewer of them are searched in each."""
+    """Return the best few of some starts that were searched once after further rounds: fewer of them are searched in each.
+
+    Those with a panel that is all but a triangle are left where another has none.
+    """
     left, refined = LEFT_BEFORE_ROUND[effort], effort != "best"
     for number in range(MOST_ROUNDS[effort]):
         report(0.6 + 0.3 * number / MOST_ROUNDS[effort])
-        tried = sorted(tried, key=lambda each: each[:2])[: left[min(number, len(left) - 1)]]
+        sound = [each for each in tried if not wide_corners(each.search.mesh)]
+        tried = sorted(sound or tried, key=lambda each: each[:2])[: left[min(number, len(left) - 1)]]
         last = tried[0].cost
         tried = [each._replace(cost=search_once(each.search, twice=effort != "quick")) for each in tried]
         stagnates = number >= len(left) - 1 and tried[0].cost > (1.0 - LEAST_FALL) * last

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import coo_matrix, csc_matrix, identity
-from scipy.sparse.linalg import splu
+from scipy.sparse import coo_matrix, csc_matrix, diags
+from scipy.sparse.linalg import SuperLU, splu
 from scipy.spatial import cKDTree
 
 from ..improve.working_mesh import WorkingMesh
@@ -131,8 +131,9 @@ def _passage(
     """Return the right angles from the axes at one place to those at another, and the way from the other to the one [members]."""
     x, y = dots(along, other_along), dots(along, other_across)
     turn = np.rint(np.arctan2(y, x) / (math.pi / 2)).astype(np.int64) % 4
-    u = 0.5 * (dots(way, along) + dots(way, _turned(other_along, other_across, turn)))
-    v = 0.5 * (dots(way, across) + dots(way, _turned(other_along, other_across, turn + 1)))
+    p, q = dots(way, other_along), dots(way, other_across)
+    u = 0.5 * (dots(way, along) + np.choose(turn, [p, q, -p, -q]))
+    v = 0.5 * (dots(way, across) + np.choose(turn, [q, -p, -q, p]))
     return turn, np.stack([u, v], axis=1) / (0.5 * (length + other_length))[:, None]
 
 
@@ -142,12 +143,6 @@ def _frames(normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     first = np.cross(axis, normals)
     first /= np.linalg.norm(first, axis=1, keepdims=True)
     return first, np.cross(normals, first)
-
-
-def _turned(along: np.ndarray, across: np.ndarray, turn: np.ndarray) -> np.ndarray:
-    """Return the first axes turned by right angles."""
-    turn = (turn % 4)[:, None]
-    return np.where(turn % 2 == 0, along, across) * np.where(turn < 2, 1.0, -1.0)
 
 
 def _directions(
@@ -185,14 +180,19 @@ def _directions(
         aim, strength = np.where(led, aim, wanted), np.where(led, strength, share**2 * guide.weight)
     if not strength.any():
         aim[0], strength[0] = 1.0, 1e-3
-    pull = csc_matrix((strength.astype(complex), (np.arange(count), np.arange(count))), shape=(count, count))
-    field = splu(laplacian + pull + 1e-9 * identity(count)).solve(strength * aim)
+    field = _factored(laplacian, strength + 1e-9).solve(strength * aim)
     rate = 1.0 / diffusion
-    solver = splu((laplacian + pull + rate * identity(count)).tocsc())
+    solver = _factored(laplacian, strength + rate)
     for _ in range(DIRECTION_TURNS):
         unit = field / np.maximum(np.abs(field), 1e-300)
         field = solver.solve(strength * aim + rate * unit)
     return np.angle(field) / 4
+
+
+def _factored(matrix: csc_matrix, pull: np.ndarray) -> SuperLU:
+    """Return the factors of a matrix with more on its diagonal, which is positive definite and needs no pivots."""
+    pulled = matrix + diags(pull, format="csc")
+    return splu(pulled, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
 
 
 def _distances_from(mesh: FineMesh, some: np.ndarray) -> np.ndarray:
@@ -238,10 +238,9 @@ def _lattice(
     aim = np.zeros((count, 2, 2))
     aim[:, :, 0] = 1.0
     held = pull * aim.ravel()
-    extra = csc_matrix((pull, (np.arange(4 * count), np.arange(4 * count))), shape=matrix.shape)
-    field = splu((matrix + extra + 1e-6 * identity(4 * count)).tocsc()).solve(held)
+    field = _factored(matrix, pull + 1e-6).solve(held)
     rate = 1.0 / diffusion
-    solver = splu((matrix + extra + rate * identity(4 * count)).tocsc())
+    solver = _factored(matrix, pull + rate)
     for _ in range(LATTICE_TURNS):
         pairs = field.reshape(-1, 2)
         unit = pairs / np.maximum(np.linalg.norm(pairs, axis=1, keepdims=True), 1e-300)

@@ -19,6 +19,7 @@ from ..surface.local_surface import CENTRE, NORMAL, onto_patch
 FLAT = 4.0  # what a corner of 180 degrees costs beside the square of its cosine, by the eighth power of that
 SAG_WEIGHT = 700.0  # of the square of what a curve is farther from its member than is free
 SAG_FREE = 0.04  # distance of a curve from its member that costs nothing [members]
+SAG_REACH = 2.5  # way along the curve within which its members end [members]
 SAG_SAMPLES = 7  # places on the curve at which it is measured
 SAG_STEP = 0.02  # way along the curve over which its change is found [members]
 QUAD_REACH = 0.8  # distance from the centre of its patch beyond which a node is not moved [member lengths]
@@ -100,18 +101,28 @@ def node_energy(
 
 
 @kernel
-def sag_energy(curves: Curves, curve: int, arc: float, place: Vector, other: Vector, target: float) -> float:
-    """What a member costs because its curve leaves it; nothing where its other end is not on the same curve.
-
-    place : of the first end, at `arc` of the curve
-    """
-    there, x, y, z = slide(curves, curve, arc, 2.5 * target, other[0], other[1], other[2])
-    off = subtract((x, y, z), other)
-    if dot(off, off) > 0.01 * target * target:
+def way_on_curve(
+    nodes: np.ndarray, held: np.ndarray, curve: np.ndarray, arc: np.ndarray, curves: Curves, on: int, from_arc: float,
+    u: int, target: float,
+) -> float:  # fmt: skip
+    """Way along a curve from an arc length to another node; 0 where that is not near it on the same curve."""
+    there, total, reach = arc[u], curves.total[on], SAG_REACH * target
+    if held[u] == 1 and curve[u] != on:
         return 0.0
-    way, total = there - arc, curves.total[curve]
-    if not is_open(curves, curve):
+    if held[u] != 1:  # a corner or an end, which is on several curves
+        there, x, y, z = slide(curves, on, from_arc, reach, nodes[u, 0], nodes[u, 1], nodes[u, 2])
+        off = subtract((x, y, z), row(nodes, u))
+        if dot(off, off) > 0.01 * target * target:
+            return 0.0
+    way = there - from_arc
+    if not is_open(curves, on):
         way -= total * math.floor(way / total + 0.5)
+    return way if abs(way) < reach else 0.0
+
+
+@kernel
+def sag_of(curves: Curves, curve: int, arc: float, way: float, place: Vector, other: Vector, target: float) -> float:
+    """How far a curve leaves a member between two places, at `arc` of the curve and at some way along it [members]."""
     side = subtract(other, place)
     square, farthest = max(dot(side, side), 1e-12 * target * target), 0.0
     for k in range(1, SAG_SAMPLES + 1):
@@ -120,17 +131,27 @@ def sag_energy(curves: Curves, curve: int, arc: float, place: Vector, other: Vec
         t = min(max(dot(d, side) / square, 0.0), 1.0)
         d = (d[0] - t * side[0], d[1] - t * side[1], d[2] - t * side[2])
         farthest = max(farthest, dot(d, d))
-    excess = max(math.sqrt(farthest) / target - SAG_FREE, 0.0)
+    return math.sqrt(farthest) / target
+
+
+@kernel
+def sag_energy(sag: float) -> float:
+    """What a member costs because its curve leaves it so far."""
+    excess = max(sag - SAG_FREE, 0.0)
     return SAG_WEIGHT * excess * excess
 
 
 @kernel
 def sag_around(
     nodes: np.ndarray, quads: np.ndarray, share: np.ndarray, of: np.ndarray, begin: int, end: int, v: int, place: Vector,
-    arc: float, held: np.ndarray, curve: np.ndarray, curves: Curves, desired: np.ndarray,
-) -> float:  # fmt: skip
-    """What the members at a node cost because its curve leaves them, if it stood at an arc length; parameters as in `node_energy`."""
-    energy = 0.0
+    here: float, held: np.ndarray, curve: np.ndarray, arc: np.ndarray, curves: Curves, desired: np.ndarray,
+) -> tuple[float, float]:  # fmt: skip
+    """What the members at a node cost because its curve leaves them, if it stood at a place, `here` on its curve.
+
+    Also how far the node may slide before one costs more, as the curve cannot leave it by more than that [members]. Other
+    parameters as in `node_energy`.
+    """
+    energy, most = 0.0, 0.0
     for i in range(begin, end):
         q = of[i]
         k = 0
@@ -142,8 +163,11 @@ def sag_around(
             if held[u] > 0:
                 weight = share[q, k] if way == 1 else share[q, (k + 3) % 4]
                 target = 0.5 * (desired[v] + desired[u])
-                energy += weight * sag_energy(curves, curve[v], arc, place, row(nodes, u), target)
-    return energy
+                along_it = way_on_curve(nodes, held, curve, arc, curves, curve[v], here, u, target)
+                if along_it != 0.0:
+                    sag = sag_of(curves, curve[v], here, along_it, place, row(nodes, u), target)
+                    energy, most = energy + weight * sag_energy(sag), max(most, sag)
+    return energy, SAG_FREE - most
 
 
 @kernel
@@ -181,19 +205,27 @@ def settle_quads(
             before, gx, gy, gz = node_energy(
                 nodes, quads, share, of, begin, end, v, place, normal, desired, lengths, angles
             )
+            spare = 0.0
             if held[v] == 1:
-                by = SAG_STEP * desired[v]
-                back, x, y, z = at_arc(curves, curve[v], arc[v] - by)
-                there, u, w, t = at_arc(curves, curve[v], arc[v] + by)
-                before += sag_around(
-                    nodes, quads, share, of, begin, end, v, place, arc[v], held, curve, curves, desired
+                sagging, spare = sag_around(
+                    nodes, quads, share, of, begin, end, v, place, arc[v], held, curve, arc, curves, desired
                 )
-                slope = sag_around(
-                    nodes, quads, share, of, begin, end, v, (u, w, t), there, held, curve, curves, desired
-                ) - sag_around(nodes, quads, share, of, begin, end, v, (x, y, z), back, held, curve, curves, desired)
-                run = subtract((u, w, t), (x, y, z))
-                slope /= max(dot(run, run), by * by)
-                gx, gy, gz = gx + slope * run[0], gy + slope * run[1], gz + slope * run[2]
+                before += sagging
+                if spare < SAG_STEP:
+                    by = SAG_STEP * desired[v]
+                    back, x, y, z = at_arc(curves, curve[v], arc[v] - by)
+                    there, u, w, t = at_arc(curves, curve[v], arc[v] + by)
+                    slope = (
+                        sag_around(
+                            nodes, quads, share, of, begin, end, v, (u, w, t), there, held, curve, arc, curves, desired
+                        )[0]
+                        - sag_around(
+                            nodes, quads, share, of, begin, end, v, (x, y, z), back, held, curve, arc, curves, desired
+                        )[0]
+                    )
+                    run = subtract((u, w, t), (x, y, z))
+                    slope /= max(dot(run, run), by * by)
+                    gx, gy, gz = gx + slope * run[0], gy + slope * run[1], gz + slope * run[2]
             else:
                 over = gx * normal[0] + gy * normal[1] + gz * normal[2]
                 gx, gy, gz = gx - over * normal[0], gy - over * normal[1], gz - over * normal[2]
@@ -218,8 +250,10 @@ def settle_quads(
                         step *= 0.3
                         continue
                 after = node_energy(nodes, quads, share, of, begin, end, v, to, normal, desired, lengths, angles)[0]
-                if held[v] == 1:
-                    after += sag_around(nodes, quads, share, of, begin, end, v, to, new, held, curve, curves, desired)
+                if held[v] == 1 and size > spare * local:
+                    after += sag_around(
+                        nodes, quads, share, of, begin, end, v, to, new, held, curve, arc, curves, desired
+                    )[0]
                 if after < before:
                     nodes[v, 0], nodes[v, 1], nodes[v, 2] = to
                     arc[v] = new
@@ -258,9 +292,10 @@ def energy_of_quads(
             if held[v] > 0 and held[a] > 0 and held[v] + held[a] < 4:
                 on, other = (v, a) if held[v] == 1 else (a, v)
                 target = 0.5 * (desired[v] + desired[a])
-                energy += share[q, k] * sag_energy(
-                    curves, curve[on], arc[on], row(nodes, on), row(nodes, other), target
-                )
+                way = way_on_curve(nodes, held, curve, arc, curves, curve[on], arc[on], other, target)
+                if way != 0.0:
+                    sag = sag_of(curves, curve[on], arc[on], way, row(nodes, on), row(nodes, other), target)
+                    energy += share[q, k] * sag_energy(sag)
             e, f = subtract(row(nodes, a), place), subtract(row(nodes, b), place)
             energy += angles * corner_energy(e, f, vector_in(patches, v, NORMAL))[0]
         out[q] = energy
