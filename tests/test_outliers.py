@@ -276,7 +276,8 @@ def test_cleaning_takes_as_many_outliers_as_a_grid_and_none_of_a_scan_without(na
 def test_cleaning_looks_closer_where_it_is_asked_to() -> None:
     shape = make("scallop", 30_000, noise=0.3)
     found = {
-        when: clean_points(shape.points, judge_outliers=when, smooth=False, normals=False).steps for when in ("auto", "always")
+        when: clean_points(shape.points, judge_outliers=when, smooth=False, normals=False).steps
+        for when in ("auto", "always")
     }
     looked, always = (next(step for step in steps if step.name == "outliers") for steps in found.values())
     assert looked.count == 0 and "--judge-outliers always" in looked.words and always.count > 0
