@@ -145,7 +145,7 @@ def only_leaves_out(fault: ScanTrussError) -> TypeGuard[CertificateError]:
 def joins_sheets(fault: ScanTrussError | None) -> bool:
     """Whether a grid cuts itself everywhere since it joins sheets of the scan that lie too near each other: no other look parts them."""
     found = fault.grid.certificate if isinstance(fault, CertificateError) else None
-    return found is not None and found.pieces < found.scan_pieces and found.crossings >= MOST_CROSSINGS
+    return found is not None and found.crossings >= MOST_CROSSINGS and found.pieces < found.scan_pieces
 
 
 def _has_more_outliers(cloud: PointCloud, settings: Settings) -> bool:
