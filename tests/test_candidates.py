@@ -9,6 +9,7 @@ from typing import Any, Never, cast
 import naive_grid as naive
 import numpy as np
 import pytest
+from marks import compiled_only
 from shapes import Shape, make
 from small_clouds import cap, sheet
 from steps import lines_of_readme, steps_of
@@ -295,3 +296,25 @@ def test_fronts_that_would_all_miss_the_same_limbs_are_not_tried() -> None:
         for _ in range(2):
             limit.note(attempt, fault(kind))
         assert limit.allows(attempt) == tried
+
+
+@compiled_only
+@pytest.mark.parametrize("apart", [0.36, 0.4])
+def test_two_layers_too_near_for_the_members_are_refused_after_two_grids(
+    apart: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The grid joins them and cuts itself everywhere: no other look at the scan, and no less effort, would part them."""
+    rng = np.random.default_rng(0)
+    x, y = rng.uniform(-9.0, 9.0, 40_000), rng.uniform(-6.0, 6.0, 40_000)
+    z = apart * 1.6 * (np.arange(len(x)) % 2) + rng.normal(0.0, 0.004, len(x))
+    made: list[Attempt] = []
+
+    def counted(cloud: st.PointCloud, attempt: Attempt, **others: Any) -> st.Grid:
+        made.append(attempt)
+        return make_grid(cloud, attempt, **others)
+
+    make_grid = pipeline.make_grid
+    monkeypatch.setattr(pipeline, "make_grid", counted)
+    with pytest.raises(CertificateError, match="is in 1 piece where the scan has 2"):
+        st.grid_from_points(np.column_stack([x, y, z]), st.Settings(length=1.6))
+    assert len(made) == 2

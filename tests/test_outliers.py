@@ -262,6 +262,29 @@ def test_a_grid_and_cleaning_judge_alike_whatever_the_member_length() -> None:
     assert found == {int(outliers.find_outliers(cloud.points, 3.0).sum())}
 
 
+@pytest.mark.parametrize("name", ["scallop", "cloth", "gable"])
+def test_cleaning_takes_as_many_outliers_as_a_grid_and_none_of_a_scan_without(name: str) -> None:
+    for share in (0.0, 0.02):
+        shape = make(name, 30_000, outliers=share)
+        cloud = st.PointCloud.from_array(shape.points)
+        in_grid = sample_surface(cloud, st.Settings(length=shape.length)).outliers
+        counts = {step.name: step.count for step in clean_points(cloud, duplicates=None).steps}
+        assert counts["outliers"] == in_grid
+        assert (in_grid > 0) == (share > 0.0)
+
+
+def test_cleaning_looks_closer_where_it_is_asked_to() -> None:
+    shape = make("scallop", 30_000, noise=0.3)
+    found = {
+        when: clean_points(shape.points, judge_outliers=when, smooth=False, normals=False).steps
+        for when in ("auto", "always")
+    }
+    looked, always = (next(step for step in steps if step.name == "outliers") for steps in found.values())
+    assert looked.count == 0 and "--judge-outliers always" in looked.words and always.count > 0
+    with pytest.raises(st.InputError, match="judge_outliers must be one of auto, always, got 'never'"):
+        clean_points(shape.points, judge_outliers="never")
+
+
 @pytest.mark.kernels
 def test_a_small_sparse_part_inside_a_sheet_stays_and_a_few_strays_go() -> None:
     x, y = (axis.ravel() for axis in np.meshgrid(np.arange(24) * 1.0, np.arange(24) * 1.0))

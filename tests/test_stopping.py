@@ -54,6 +54,32 @@ def deaf(a):
 JOIN = "threading.Thread(target=time.sleep, args=(1000,)).start(); time.sleep(1000)"
 
 
+INTERRUPTS_AN_IMPORT = """
+import signal, sys
+
+class Interrupts:
+    def find_spec(self, name, path=None, target=None):
+        if name == {name!r}:
+            signal.raise_signal(signal.SIGINT)
+
+sys.meta_path.insert(0, Interrupts())
+"""
+
+
+@pytest.mark.parametrize("name", ["__main__", "cli", "cli.start", "runtime", "runtime.stopping", "cli.main", "errors"])
+def test_an_interruption_is_one_line_from_the_first_of_our_imports_on(tmp_path: Path, name: str) -> None:
+    (tmp_path / "sitecustomize.py").write_text(INTERRUPTS_AN_IMPORT.format(name=f"scantruss.{name}"))
+    paths = os.pathsep.join([str(tmp_path), *filter(None, [os.environ.get("PYTHONPATH")])])
+    words = [sys.executable, "-m", "scantruss", "--version"]
+    run = subprocess.run(words, env=os.environ | {"PYTHONPATH": paths}, capture_output=True, text=True, check=False)
+    assert (run.returncode, run.stderr) == (130, "scantruss: interrupted; nothing was written\n")
+
+
+def test_a_program_that_imports_us_keeps_its_own_answer_to_interruptions() -> None:
+    code = "import signal; kept = signal.getsignal(signal.SIGINT); import scantruss; scantruss.Settings"
+    subprocess.run([sys.executable, "-c", f"{code}; assert signal.getsignal(signal.SIGINT) is kept"], check=True)
+
+
 @pytest.mark.parametrize("number", list(ENDS))
 @pytest.mark.parametrize("wait", ["time.sleep(1000)", LOOP, JOIN])
 def test_what_never_comes_back_is_ended_and_cleaned_up(tmp_path: Path, number: signal.Signals, wait: str) -> None:

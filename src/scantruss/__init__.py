@@ -9,7 +9,30 @@ Step by step: `read_points` (and `clean_points`), `sample_surface`, `find_bounda
 
 from __future__ import annotations
 
+import os
 import sys
+
+
+def end_at_once(*_: object) -> None:
+    """Answer Ctrl-C in one line before `runtime.stopping` does: nothing is there yet to be cleaned up."""
+    os.write(2, b"scantruss: interrupted; nothing was written\n")
+    os._exit(130)
+
+
+def _is_command() -> bool:
+    """Whether this is the first import of a process started as `scantruss` or `python -m scantruss`, not of a program that uses us."""
+    if sys.argv[:1] == ["-m"]:  # so it is while a module is being found that is to be run
+        return "-m scantruss" in " ".join(sys.orig_argv)
+    return "".join(sys.argv[:1]).replace(os.sep, "/").rpartition("/")[2] in ("scantruss", "scantruss.exe")
+
+
+if _is_command():
+    # what `signal` is made of: that takes as long to import as all else until here
+    import _signal  # type: ignore[import-not-found]
+
+    # what is ignored stays so, as in the background of a shell
+    if _signal.getsignal(_signal.SIGINT) is _signal.default_int_handler:
+        _signal.signal(_signal.SIGINT, end_at_once)
 
 TYPE_CHECKING = False  # typing takes as long to import as all else until Ctrl-C is listened to
 if TYPE_CHECKING:  # a name is imported when it is first used, so that the command line starts quickly

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, TypeGuard
 
 from .boundary.find import find_boundary
 from .cells.make import settings_of_triangles
+from .check.crossings import MOST_CROSSINGS
 from .constraints.find import ridges_away_from
 from .constraints.ridges import find_ridges
 from .errors import CertificateError, FrontError, OneSidedError, ScanTrussError
@@ -141,6 +142,12 @@ def only_leaves_out(fault: ScanTrussError) -> TypeGuard[CertificateError]:
     return found is not None and {each.kind for each in found.faults} == {"cover"}
 
 
+def joins_sheets(fault: ScanTrussError | None) -> bool:
+    """Whether a grid cuts itself everywhere since it joins sheets of the scan that lie too near each other: no other look parts them."""
+    found = fault.grid.certificate if isinstance(fault, CertificateError) else None
+    return found is not None and found.crossings >= MOST_CROSSINGS and found.pieces < found.scan_pieces
+
+
 def _has_more_outliers(cloud: PointCloud, settings: Settings) -> bool:
     """Whether there are outliers that do not show where samples stand alone, as they are many or the members long."""
     always = sample_surface(cloud, settings.replace(judge_outliers="always")).outliers
@@ -252,6 +259,8 @@ class AttemptLimit:
         far = self._far_in_a_row(attempt.settings) + 1 if _is_far_from_passing(attempt, fault) else 0
         self._far = [pair for pair in self._far if pair[0] != attempt.settings] + [(attempt.settings, far)]
         self._given_up += far == MOST_FAR and not attempt.settings.smooth_scale  # of those there are four
+        if far == MOST_FAR and joins_sheets(fault):
+            self._given_up = MOST_GIVEN_UP
 
 
 def _is_far_from_passing(attempt: Attempt, fault: ScanTrussError) -> bool:

@@ -8,7 +8,7 @@ from time import perf_counter
 
 import numpy as np
 
-from .attempts import Attempt, AttemptLimit, attempts, only_leaves_out
+from .attempts import Attempt, AttemptLimit, attempts, joins_sheets, only_leaves_out
 from .boundary.find import find_boundary
 from .candidates import advance_fronts, best_that_passes, improve_fronts
 from .cells.make import certified_cells, settings_of_triangles, with_cells
@@ -108,6 +108,8 @@ def grid_from_cloud(
             return grid.replace(seconds=watch.seconds())
         except FrontError as error:
             refused = refused or error
+            if joins_sheets(error):
+                break
     assert refused is not None
     if not keep_failed or not isinstance(refused, CertificateError) or not len(refused.grid.triangles):
         raise refused

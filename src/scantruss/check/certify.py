@@ -26,6 +26,7 @@ from .irregular import count_irregular
 from .left_out import parts_left_out
 from .limits import ROUNDED_BY, limits_of, places_to_look_at, widened_limits
 from .sheets import cut_apart, faults_on_sheets, nodes_of_samples
+from .unfollowed import unfollowed_parts
 
 if TYPE_CHECKING:
     from ..boundary.find import Boundary
@@ -79,11 +80,15 @@ def certify(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings: S
     too_far, poor = limits_of(grid, found, settings)
     known = {fault.kind for fault in faults}
     faults += [fault for fault in (*too_far, *faults_on_sheets(grid, samples, nearest)) if fault.kind not in known]
-    missed_at = place_of(samples.scan[_missed(grid, samples, found, length)] + samples.origin)
-    rounded = _rounded(grid, samples, found, length)
+    members = _desired_at_points(grid, found, length)
+    followed = (samples.judged == KEPT) & ~samples.elsewhere
+    missed_at = place_of(samples.scan[_missed(found, followed, members)] + samples.origin)
+    rough = samples.moved  # then its roughness is the scatter
+    rounded = 0.0 if rough else _rounded(found, followed, members)
+    beside = [] if rough else unfollowed_parts(grid, samples, found, followed, members)
     apart = cut_apart(grid, samples, found, length)
     places = places_to_look_at(certificate, missed_at, rounded)
-    warnings = (*poor, *apart, *bridged, *doubtful, *aside, *places)
+    warnings = (*poor, *apart, *bridged, *doubtful, *aside, *beside, *places)
     return replace(certificate, faults=tuple(faults), warnings=warnings, widened=widened_limits(settings))
 
 
@@ -200,26 +205,15 @@ def _desired_at_points(grid: Grid, found: Distances, length: float) -> np.ndarra
     return lengths
 
 
-def _missed(grid: Grid, samples: SurfaceSamples, found: Distances, length: float) -> int:
-    """Return which point is the farthest from the grid of those that are not named otherwise: kept and within a member."""
-    members = _desired_at_points(grid, found, length)
-    return int(
-        np.where(
-            (samples.judged == KEPT) & ~samples.elsewhere & (found.scan <= members), found.scan / members, -1.0
-        ).argmax()
-    )
+def _missed(found: Distances, followed: np.ndarray, members: np.ndarray) -> int:
+    """Return which point is the farthest from the grid of those that it follows (N,) bool, and that lie within a member (N,) of it."""
+    return int(np.where(followed & (found.scan <= members), found.scan / members, -1.0).argmax())
 
 
-def _rounded(grid: Grid, samples: SurfaceSamples, found: Distances, length: float) -> float:
-    """Return the share of the points that a grid rounds off: kept ones beyond `ROUNDED_BY` that are not missed.
-
-    None of a rough scan that was smoothed: its roughness is the scatter.
-    """
-    if samples.moved:
-        return 0.0
-    members = _desired_at_points(grid, found, length)
+def _rounded(found: Distances, followed: np.ndarray, members: np.ndarray) -> float:
+    """Return the share of the points that a grid rounds off: of those that it follows (N,) bool, by desired member lengths (N,)."""
     off = (found.scan > ROUNDED_BY * members) & (found.scan <= COVER_REACH * members)
-    return float(((samples.judged == KEPT) & ~samples.elsewhere & off).mean())
+    return float((followed & off).mean())
 
 
 def _spread(values: np.ndarray, places: np.ndarray, grid: Grid, weight: np.ndarray) -> Spread | None:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
+from ..settings import JUDGE_OUTLIERS
 from .outputs import claim, claim_clouds
 from .shared import cloud_file_notes, note_compiling, read_scan
 
@@ -56,6 +57,13 @@ def clean_parser() -> Parser:
         )
         keep, said = KEEP_OPTIONS[name]
         steps.add_argument(f"--{keep}", action="store_true", help=said)
+    steps.add_argument(
+        "--judge-outliers",
+        metavar="|".join(JUDGE_OUTLIERS),
+        choices=JUDGE_OUTLIERS,
+        default="auto",
+        help="when to look for outliers: auto, if points stand alone, as a grid does; or always",
+    )
     steps.add_argument("--no-smooth", action="store_true", help="leave points where they are: remove no noise")
     steps.add_argument(
         "--spacing",
@@ -115,6 +123,7 @@ def _steps(values: Namespace) -> dict[str, Any]:
         "smooth": not values.no_smooth,
         "normals": not values.no_normals,
         "spacing": values.spacing,
+        "judge_outliers": values.judge_outliers,
     }
     for name in SHARES:
         field = name.replace("-", "_")

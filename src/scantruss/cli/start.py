@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import os
+from .. import end_at_once
 
 
 def start() -> int:
@@ -13,8 +13,7 @@ def start() -> int:
         watch()
         from .main import main
     except KeyboardInterrupt:
-        os.write(2, b"scantruss: interrupted; nothing was written\n")
-        os._exit(130)
+        end_at_once()
     status = main()
     leave_to_watch()
     return status

@@ -24,7 +24,7 @@ class Fault:
     """What is wrong with a grid; "the grid " and `words` make a sentence."""
 
     #: empty manifold orientable pieces loops crossing folded uneven cover torn astray fixed; angle short long offset as fault or
-    #: warning; of a warning far, left out, gap, hole, zigzag, aside, cut, missed, ridge
+    #: warning; of a warning far, left out, gap, hole, zigzag, aside, cut, missed, rounded, unfollowed, apart, ridge
     kind: str
     words: str
     where: Place | None = None  #: a place in the scan's own frame [scan unit], the worst

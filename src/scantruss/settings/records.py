@@ -18,6 +18,7 @@ SMOOTH_SAMPLE_SPACING = 0.3  # the same for a dense, smooth scan [member lengths
 HOLE = 4.0  # boundary length of the smallest hole worth keeping; the front runs over smaller ones [member lengths]
 CELLS = ("triangle", "quad", "hexagon")
 ROW_GUIDES = ("boundary", "curvature")
+JUDGE_OUTLIERS = ("auto", "always")
 METHODS = ("default", "paper")
 EFFORTS = ("normal", "quick", "best")
 PREFER = ("balance", "lengths", "shapes")
@@ -158,7 +159,7 @@ class CleaningSettings(_Checked):
     )
     judge_outliers: str = _setting(
         "auto", "when to look for outliers: auto, if samples are isolated or no grid passes; or always",
-        choices=("auto", "always"),
+        choices=JUDGE_OUTLIERS,
     )  # fmt: skip
     keep_rods: bool = _setting(
         True,

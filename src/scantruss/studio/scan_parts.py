@@ -30,7 +30,7 @@ class Cleaning:
     def options(self) -> list[str]:
         """The options of ``scantruss clean``."""
         numbers = ["--outlier-distance", f"{self.outlier_distance:g}", "--loose-pieces", f"{self.loose_pieces:g}"]
-        return [*numbers, "--keep-layers", "--no-smooth", "--no-normals"]
+        return [*numbers, "--judge-outliers", "always", "--keep-layers", "--no-smooth", "--no-normals"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +48,7 @@ class WholeScan:
 
 
 def cleaning_of(cloud: PointCloud, outlier_distance: float, loose_pieces: float) -> Cleaning:
-    """Return what a cleaning would remove of a scan, as ``scantruss clean`` does it.
+    """Return what a cleaning would remove of a scan, as ``scantruss clean`` does it; outliers are always looked for, since a person judges.
 
     Raises
     ------
@@ -56,7 +56,8 @@ def cleaning_of(cloud: PointCloud, outlier_distance: float, loose_pieces: float)
         A number is out of range, or too few points would be left.
     """
     found = clean_points(
-        cloud, outlier_distance=outlier_distance, loose_pieces=loose_pieces, layer_distance=None, smooth=False, normals=False
+        cloud, outlier_distance=outlier_distance, judge_outliers="always", loose_pieces=loose_pieces, layer_distance=None,
+        smooth=False, normals=False,
     )  # fmt: skip
     removes = np.ones(len(cloud.points), np.bool_)
     removes[found.kept] = False

@@ -11,6 +11,7 @@ from ...kernels.geometry.components import component_labels
 from ...kernels.scan import outliers as kernels
 from ...runtime.parallel import in_parts, run_in_parts
 from .nearby import NEIGHBORS_OF_A_POINT, REACH_TO, SEARCHES_PER_THREAD, Nearby
+from .thinning import thin_to
 
 ROUNDS_OF_OUTLIERS = 5  # outliers close together hide each other: each round reveals some more
 FARTHEST_REACH = 4.5  # reach, over the upper quartile of all, above which a point is an outlier whatever is near it
@@ -36,11 +37,27 @@ OPEN_EDGE = (
 # fewest of these; most at a free edge, in square roots of their number: hardly more than three sides of a square
 MANY_OF_PART, EDGE_OF_COMPACT = 200, 3.3
 LONE_SHARE = 3e-4  # share of samples without neighbours above which outliers are sought
+ENOUGH_AROUND = 6  # neighbours with which a sample is not alone
+# distance between samples where no member length is given, and within which they have neighbours [spacings of the points]: as those
+# of a grid with members of 20 spacings
+SAMPLES_APART, NEIGHBORS_WITHIN = 4.0, 28.0
 
 
 def has_outliers(neighbors: np.ndarray) -> bool:
     """Whether enough samples are isolated to look for outliers; neighbors (S, K) as `kernels.nearest_samples`."""
-    return bool((neighbors[:, 5] < 0).mean() > LONE_SHARE)
+    return bool((neighbors[:, ENOUGH_AROUND - 1] < 0).mean() > LONE_SHARE)
+
+
+def some_stand_alone(points: np.ndarray, spacing: float) -> bool:
+    """Whether enough points (N, 3) are isolated to look for outliers, as `has_outliers` says of the samples of a grid.
+
+    spacing : of the points [scan unit]
+    """
+    if spacing <= 0.0:
+        return False
+    near = Nearby.of(points[thin_to(points, SAMPLES_APART * spacing)])
+    far = near.squares > (NEIGHBORS_WITHIN * spacing) ** 2
+    return has_outliers(np.where(far, -1, near.neighbors))
 
 
 def find_outliers(points: np.ndarray, distance: float) -> np.ndarray:

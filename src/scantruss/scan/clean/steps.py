@@ -8,12 +8,13 @@ import numpy as np
 
 from ...errors import InputError, unit_words
 from ...runtime.progress import Progress
-from ..cloud import PointCloud
+from ...settings import JUDGE_OUTLIERS
+from ..cloud import PointCloud, measure_spacing
 from .duplicates import find_near_duplicates, find_repeated
 from .nearby import REACH_TO, Nearby
 from .noise import find_layers, fit_surfaces, onto_surfaces
 from .normals import orient_to_one_side
-from .outliers import find_outliers
+from .outliers import find_outliers, some_stand_alone
 from .pieces import find_loose_pieces
 from .thinning import thin_to
 
@@ -47,6 +48,7 @@ def clean_points(
     *,
     duplicates: float | None = 0.01,
     outlier_distance: float | None = 3.0,
+    judge_outliers: str = "auto",
     loose_pieces: float | None = 0.005,
     layer_distance: float | None = 2.0,
     smooth: bool = True,
@@ -65,6 +67,8 @@ def clean_points(
     outlier_distance : float
         Points this many times farther from others than their neighbours are left out, and points off the surface; 0 keeps all, as
         with `Settings.outlier_distance`.
+    judge_outliers : str
+        "auto" looks for them where points stand alone, as a grid does; "always" takes the most doubtful points of a good scan too.
     loose_pieces : float
         Detached pieces with less than this share of the points are left out; clouds that form no surface with up to four times as
         many, or of any number if they are narrow compared with the largest piece; 0 leaves out none.
@@ -87,6 +91,8 @@ def clean_points(
         A number is out of range, or too few points are left.
     """
     _check(duplicates, outlier_distance, loose_pieces, layer_distance, spacing)
+    if judge_outliers not in JUDGE_OUTLIERS:
+        raise InputError(f"judge_outliers must be one of {', '.join(JUDGE_OUTLIERS)}, got {judge_outliers!r}")
     cloud = points if isinstance(points, PointCloud) else PointCloud.from_array(points, unit=unit)
     work = _Work(cloud, progress)
     if duplicates is not None:
@@ -94,7 +100,7 @@ def clean_points(
         work.leave_out("near_duplicates", find_near_duplicates(work.points, duplicates), "near duplicates left out")
     if outlier_distance:
         work.say("outliers")
-        work.leave_out("outliers", find_outliers(work.points, outlier_distance), "outliers left out")
+        work.leave_out_outliers(outlier_distance, judge_outliers)
     work.check_enough()
     if loose_pieces is not None:
         work.say("pieces")
@@ -156,6 +162,13 @@ class _Work:
             self.points, self.kept = self.points[~which], self.kept[~which]
             if self._normals is not None:
                 self._normals = self._normals[~which]
+
+    def leave_out_outliers(self, distance: float, when: str) -> None:
+        """Leave out what lies off every surface."""
+        if when == "always" or some_stand_alone(self.points, measure_spacing(self.points)):
+            self.leave_out("outliers", find_outliers(self.points, distance), "outliers left out")
+        else:
+            self.add("outliers", 0, "outliers left out: no point stands alone; --judge-outliers always looks closer")
 
     def check_enough(self) -> None:
         """Refuse to go on with too few points."""

@@ -1,0 +1,81 @@
+"""Parts of a scan that run along its grid and that it does not follow, such as a ring beam, a rib, an upstand or a second layer."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..grid.certificate import Fault, place_of
+from .left_out import points_together
+
+if TYPE_CHECKING:
+    from ..grid.grid import Grid
+    from ..surface.samples import SurfaceSamples
+    from .distances import Distances
+
+# distance from the grid, beyond the noise, from which on points are not followed [member lengths]: members that span a surface with a
+# radius of one member lie that far off it
+NOT_FOLLOWED = 0.125
+CUBE = 0.25  # side of the cubes in which most points must lie that far off [member lengths]
+LONG = 6.0  # longest side of the box around such a part from which on it is no bump that members round off [member lengths]
+WARN_SHARE = 0.01  # share of the points in such a part from which on it is said
+
+
+def unfollowed_parts(
+    grid: Grid, samples: SurfaceSamples, found: Distances, chosen: np.ndarray, members: np.ndarray
+) -> list[Fault]:
+    """Return a warning of the parts of a scan that a grid does not follow, though they lie within a member of it.
+
+    Such a part hangs together, is long, and most of the points in each place of it lie off the grid: noise is none.
+
+    Parameters
+    ----------
+    chosen : (N,) bool, points of the scan that the grid is to follow
+    members : (N,) desired member length at each point [scan unit]
+    """
+    noise = float(np.median(found.noise))
+    near = np.flatnonzero(chosen & (found.scan <= members))
+    off = found.scan[near] > NOT_FOLLOWED * members[near] + noise
+    if off.sum() < WARN_SHARE * len(samples.scan):
+        return []
+    side = CUBE * float(members.max())
+    which = near[off & _mostly(off, samples.scan[near], side)]
+    if not len(which):
+        return []
+    part = points_together(samples.scan[which], np.full(len(which), side))
+    parts = [which[part == number] for number in np.argsort(-np.bincount(part), kind="stable").tolist()]
+    long = [
+        own
+        for own in parts
+        if len(own) >= WARN_SHARE * len(samples.scan) and _size(own, samples) >= LONG * members[own].mean()
+    ]
+    return [_warning(grid, samples, found, long)] if long else []
+
+
+def _mostly(off: np.ndarray, points: np.ndarray, side: float) -> np.ndarray:
+    """Return which points (K, 3) lie in a cube of which most points are off (K,) bool."""
+    cube = np.floor(points / side).astype(np.int64)
+    cube -= cube.min(axis=0)
+    across = cube.max(axis=0) + 1
+    _, number = np.unique((cube[:, 0] * across[1] + cube[:, 1]) * across[2] + cube[:, 2], return_inverse=True)
+    mostly: np.ndarray = (2 * np.bincount(number, off) > np.bincount(number))[number]
+    return mostly
+
+
+def _size(which: np.ndarray, samples: SurfaceSamples) -> float:
+    """Return the longest side of the box around some points of the scan (K,)."""
+    return float(np.ptp(samples.scan[which], axis=0).max())
+
+
+def _warning(grid: Grid, samples: SurfaceSamples, found: Distances, parts: list[np.ndarray]) -> Fault:
+    """Return the warning of some parts, each the numbers of its points, with the place of each that is farthest from the grid."""
+    unit, points = f" {grid.unit}" if grid.unit else "", sum(map(len, parts))
+    worst = [int(own[found.scan[own].argmax()]) for own in parts]
+    several = f"{len(parts)} parts of the scan, the largest" if len(parts) > 1 else "a part of the scan"
+    words = (
+        f"does not follow {several} {_size(parts[0], samples):.3g}{unit} long, such as a beam, a rib or a second layer:"
+        f" {points:,} points ({points / len(samples.scan):.1%}) lie up to {found.scan[worst].max():.3g}{unit} off"
+    )
+    at, *others = (place_of(place) for place in samples.scan[worst] + samples.origin)
+    return Fault("unfollowed", words, at, tuple(others))

@@ -1,0 +1,74 @@
+"""What runs along a grid within a member of it and is not followed is said, with its place and share: a beam, a rib, a second layer."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from marks import compiled_only
+from typed import known
+
+import scantruss as st
+from scantruss.grid.certificate import Fault
+from scantruss.pipeline import grid_from_points
+
+SPRINGING = 0.4  # height of the foot of the dome over its centre [radii]
+
+
+def dome(rng: np.random.Generator, noise: float) -> np.ndarray:
+    """A dome of radius 10 down to its springing."""
+    height, turn = 10.0 * rng.uniform(SPRINGING, 1.0, 24_000), rng.uniform(0.0, 2.0 * np.pi, 24_000)
+    radius = np.sqrt(100.0 - height**2)
+    points = np.column_stack([radius * np.cos(turn), radius * np.sin(turn), height])
+    return points + rng.normal(0.0, noise, points.shape)
+
+
+def ring_beam(rng: np.random.Generator, side: float, noise: float) -> np.ndarray:
+    """The outer, upper and lower faces of a square beam around the foot of the dome."""
+    turn, along, face = rng.uniform(0.0, 2.0 * np.pi, 7_000), rng.uniform(0.0, side, 7_000), rng.integers(0, 3, 7_000)
+    foot, radius = 10.0 * SPRINGING, 10.0 * np.sqrt(1.0 - SPRINGING**2)
+    outward = np.where(face == 0, side, along)
+    down = np.where(face == 0, along, np.where(face == 1, 0.0, side))
+    points = np.column_stack([(radius + outward) * np.cos(turn), (radius + outward) * np.sin(turn), foot - down])
+    return points + rng.normal(0.0, noise, points.shape)
+
+
+def warning_of(points: np.ndarray, length: float) -> Fault | None:
+    """Return what the certificate of a grid says of parts that it does not follow."""
+    grid = grid_from_points(points, st.Settings(length=length, effort="quick"))
+    assert known(grid.certificate).passed
+    found = [each for each in known(grid.certificate).warnings if each.kind == "unfollowed"]
+    assert len(found) <= 1
+    return found[0] if found else None
+
+
+@compiled_only
+def test_a_ring_beam_a_third_of_a_member_wide_is_named_with_its_place_and_share() -> None:
+    rng = np.random.default_rng(3)
+    points = np.concatenate([dome(rng, 0.004), ring_beam(rng, 0.6, 0.004)])
+    warning = known(warning_of(points, 2.0))
+    assert "does not follow" in warning.words and "such as a beam" in warning.words
+    for place in (known(warning.where), *warning.also):
+        x, y, z = place
+        assert np.hypot(x, y) > 8.5 and z < 10.0 * SPRINGING + 0.6  # on the beam, or where the dome meets it
+    share = float(warning.words.partition("(")[2].partition("%")[0]) / 100.0
+    assert 0.01 <= share <= 7_000 / 31_000
+
+
+@compiled_only
+@pytest.mark.parametrize("noise", [0.004, 0.1])
+@pytest.mark.parametrize("length", [1.2, 2.0, 3.0])
+def test_a_dome_without_one_has_no_such_warning_noisy_or_not(noise: float, length: float) -> None:
+    assert warning_of(dome(np.random.default_rng(3), noise), length) is None
+
+
+@compiled_only
+def test_a_rib_across_a_roof_is_named_and_a_bump_as_high_is_not() -> None:
+    rng = np.random.default_rng(4)
+    x, y = rng.uniform(-10.0, 10.0, 40_000), rng.uniform(-6.0, 6.0, 40_000)
+
+    def roof(raised: np.ndarray) -> np.ndarray:
+        return np.column_stack([x, y, 2.0 * np.cos(x / 12.0) + 0.4 * raised + rng.normal(0.0, 0.004, len(x))])
+
+    warning = known(warning_of(roof((np.abs(x - 1.0) < 0.2).astype(float)), 1.5))
+    assert abs(known(warning.where)[0] - 1.0) < 0.6
+    assert warning_of(roof((np.hypot(x - 1.0, y) < 1.0).astype(float)), 1.5) is None
