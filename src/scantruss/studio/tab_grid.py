@@ -58,8 +58,8 @@ class GridTab:
         PictureTool(view, gui)
         for each in (self.members, self.panels, self.nodes, self.tubes, self.axis, self.at):
             each.on_update(step(self.draw))
-        self.range.on_update(step(self._slide))
-        self.between.on_update(view.typed(self._brush))
+        self.range.on_update(view.slid(self._slide))
+        view.typed(self.between, self._brush)
         self.coloring.on_update(step(lambda: self._chosen(view.session.state)))
         for each in (self.axis, self.at):
             each.on_update(step(lambda: view.scan.draw()))
@@ -99,13 +99,14 @@ class GridTab:
             self._values = values
             begin, end, step = round_ends(low, high)
             self.range.min, self.range.max, self.range.step = begin, end, step
-            self.range.value, self.between.value = (begin, end), ""
+            self.range.value = begin, end
+            self.view.show_text(self.between, "")
             self.legend.content = legend_of(self.coloring.value, column.unit, low, high, middle is not None)
         self.draw()
 
     def _slide(self) -> None:
         low, high = self.range.value
-        self.between.value = f"{low:g}, {high:g}"
+        self.view.show_text(self.between, f"{low:g}, {high:g}")
         self.draw()
 
     def _brush(self) -> None:

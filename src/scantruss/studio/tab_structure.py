@@ -98,7 +98,7 @@ class StructureTab:
         self.loads, self.supports = gui.add_checkbox("loads", True), gui.add_checkbox("supports", True)
         animate = gui.add_button("Animate")
         run.on_click(view.step(self._run))
-        animate.on_click(view.step(self._animate))
+        animate.on_click(view.aside(self._animate))
         self.case.on_update(view.step(self._choose))
         view.modes[SUPPORT_MODE] = lambda origin, ahead: self.support(view.under(origin, ahead))
         for each in (self.factor, self.loads, self.supports):
