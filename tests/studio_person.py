@@ -36,9 +36,9 @@ def served_session(session: Session) -> Iterator[tuple[str, Any]]:
         server.stop()
 
 
-def write_dome(folder: Path) -> Path:
-    """Write the scan of a shallow dome, 10 by 10 and 2 high."""
-    x, y = (each.ravel() for each in np.meshgrid(np.linspace(0, 10, 60), np.linspace(0, 10, 60)))
+def write_dome(folder: Path, rows: int = 60) -> Path:
+    """Write the scan of a shallow dome, 10 by 10 and 2 high, with so many rows of as many points."""
+    x, y = (each.ravel() for each in np.meshgrid(np.linspace(0, 10, rows), np.linspace(0, 10, rows)))
     np.savetxt(folder / "dome.xyz", np.stack([x, y, 2 - 0.04 * ((x - 5) ** 2 + (y - 5) ** 2)], axis=1))
     return folder / "dome.xyz"
 

@@ -293,37 +293,94 @@ def test_a_person_makes_a_grid_and_a_structure(served: tuple[str, Session], tmp_
         assert errors == []
 
 
-def test_a_server_that_is_killed_loses_nothing_but_what_it_was_at(tmp_path: Path) -> None:
+class Served:
+    """A studio in a process of its own, which can be killed and begun again."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder, self._port = folder, free_port()
+        self._process: subprocess.Popen[str] | None = None
+        self.address = f"http://127.0.0.1:{self._port}/"
+
+    def begin(self, source: str) -> None:
+        """Serve a scan or a project."""
+        command = [sys.executable, "-m", "scantruss", "studio", source, "--port", str(self._port), "--no-open"]
+        self._process = subprocess.Popen(command, cwd=self._folder, stdout=subprocess.PIPE, text=True)
+        assert self._process.stdout is not None and "studio at" in self._process.stdout.readline()
+
+    def kill(self) -> None:
+        """Kill the server at once, whatever it is at."""
+        if self._process is not None:
+            self._process.kill()
+            self._process.communicate(timeout=30)
+
+
+@pytest.fixture
+def killable(tmp_path: Path) -> Iterator[Served]:
+    """Give a studio of a shallow dome that has not begun."""
     pytest.importorskip("viser", reason="viser is not installed")
     write_dome(tmp_path)
-    port = free_port()
-
-    def begin(source: str) -> subprocess.Popen[str]:
-        command = [sys.executable, "-m", "scantruss", "studio", source, "--port", str(port), "--no-open"]
-        process = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, text=True)
-        assert process.stdout is not None and "studio at" in process.stdout.readline()
-        return process
-
-    def kill(process: subprocess.Popen[str]) -> None:
-        process.kill()
-        process.communicate(timeout=30)
-
-    process = begin("dome.xyz")
+    server = Served(tmp_path)
     try:
-        with open_page(f"http://127.0.0.1:{port}/") as (page, _):
-            page.set_viewport_size(SMALL)
-            page.wait_for_selector("text=Generate")
-            tab(page, "Design")
-            page.click("button:has-text('Generate')")
-            page.wait_for_selector("text=undo: generate")
-            said = page.inner_text("p:has-text('members')").partition("\n")[0]
-            kill(process)
-            process = begin("dome.scantruss")
-            page.goto(f"http://127.0.0.1:{port}/")
-            tab(page, "Design")
-            page.wait_for_selector(f"text={said.strip()}")
+        yield server
     finally:
-        kill(process)
+        server.kill()
+
+
+def test_a_server_that_is_killed_loses_nothing_but_what_it_was_at(killable: Served) -> None:
+    killable.begin("dome.xyz")
+    with open_page(killable.address) as (page, _):
+        page.set_viewport_size(SMALL)
+        page.wait_for_selector("text=Generate")
+        tab(page, "Design")
+        page.click("button:has-text('Generate')")
+        page.wait_for_selector("text=undo: generate")
+        said = page.inner_text("p:has-text('members')").partition("\n")[0]
+        killable.kill()
+        killable.begin("dome.scantruss")
+        page.goto(killable.address)
+        tab(page, "Design")
+        page.wait_for_selector(f"text={said.strip()}")
+
+
+def test_a_server_that_is_killed_in_a_run_of_the_structure_keeps_grid_and_structure(
+    killable: Served, tmp_path: Path
+) -> None:
+    write_dome(tmp_path, 120)
+    killable.begin("dome.xyz")
+    with open_page(killable.address) as (page, _):
+        page.set_viewport_size(SMALL)
+        page.wait_for_selector("text=Generate")
+        choose(page, "not known", "m")
+        tab(page, "Design")
+        field(page, "exactly").fill("0.4")  # many members, whose sizing takes a while
+        page.click("button:has-text('Generate')")
+        page.wait_for_selector("text=undo: generate", timeout=120_000)
+        said = page.inner_text("p:has-text('members')").partition("\n")[0]
+        tab(page, "Structure")
+        page.click("button:has-text('Run')")
+        page.wait_for_selector("text=undo: run", timeout=120_000)
+        figures = page.inner_text("p:has-text('mass without nodes')")
+        page.click("text=Sizing and modes")
+        page.wait_for_timeout(500)
+        field(page, "section").fill("CHS139.7x5")
+        field(page, "size").fill("6")
+        page.click("button:has-text('Run')")
+        page.wait_for_selector("[role=status]:has-text('weight curve')", timeout=120_000)
+        killable.kill()
+        assert not list(tmp_path.glob("*.tmp*")), "nothing half written is left"
+        killable.begin("dome.scantruss")
+        page.goto(killable.address)
+        page.wait_for_selector("text=The structure was solved before the last change", timeout=60_000)
+        tab(page, "Design")
+        page.wait_for_selector(f"text={said.strip()}")
+        tab(page, "Structure")
+        assert page.inner_text("p:has-text('mass without nodes')") == figures
+        page.click("text=Sizing and modes")
+        assert (field(page, "section").input_value(), field(page, "size").input_value()) == ("CHS139.7x5", "6")
+        field(page, "size").fill("0")
+        page.click("button:has-text('Run')")
+        page.wait_for_selector("text=undo: run", timeout=120_000)
+        page.wait_for_selector("[role=status]:has-text('ready')")
 
 
 def test_a_click_on_what_is_said_on_the_drawing_reaches_the_drawing(served: tuple[str, Session]) -> None:

@@ -66,8 +66,14 @@ class Pin(NamedTuple):
     where: tuple[float, float, float]  #: in the scan's own frame [scan unit]
 
 
-def tables_of(model: Model) -> Tables:
-    """Return the columns of nodes, members and panels, the marks first; coordinates in the frame of the scan."""
+def tables_of(model: Model, made_of: Grid | None = None) -> Tables:
+    """Return the columns of nodes, members and panels, the marks first; coordinates in the frame of the scan.
+
+    Parameters
+    ----------
+    made_of : Grid, optional
+        What a structure was made of, whose columns come too where it has the same nodes and members.
+    """
     unit, ends, corners = model.unit, model.members, model.panels
     valence = np.bincount(ends.ravel(), minlength=len(model.local))
     nodes = [column("node", "", model.node_marks)]
@@ -93,11 +99,12 @@ def tables_of(model: Model) -> Tables:
         held = np.isin(np.arange(len(model.local)), model.supported)
         nodes.append(column("support", "", ["yes" if each else "no" for each in held.tolist()]))
         members += _of_structure(model)
-    elif model.grid is not None:
-        nodes += _of_grid(model.grid)
-        members += _members_of_grid(model.grid)
-        nodes += _kinds_of_grid(model.grid, JOINTS)
-        panels += _kinds_of_grid(model.grid, PANELS)
+    grid = model.grid if model.truss is None else made_of
+    if grid is not None and np.array_equal(np.sort(grid.edges), np.sort(model.members)):
+        nodes += _of_grid(grid)
+        members += _members_of_grid(grid)
+        nodes += _kinds_of_grid(grid, JOINTS)
+        panels += _kinds_of_grid(grid, PANELS)
     return {"nodes": nodes, "members": members, "panels": panels}
 
 

@@ -211,7 +211,7 @@ class StudioView(Presses):
         kept = self._model
         if kept is None or kept[0].grid is not state.grid or kept[0].solution is not state.solution:
             model = model_to_show(state, STRUCTURE if state.solution is not None else GRID)
-            kept = self._model = (state, model, tables_of(model))
+            kept = self._model = (state, model, tables_of(model, state.grid))
         return kept[1], kept[2]
 
     def metres(self) -> float:
