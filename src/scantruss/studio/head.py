@@ -35,7 +35,7 @@ class Head:
 def words_of_session(session: Session) -> str:
     """Return what a session is at as HTML."""
     if session.message:
-        return f"<b>Refused:</b> {escape(session.message)}"
+        return f'<div class="studio-refused"><b>Refused:</b> {escape(session.message)}</div>'
     if session.stage:
         return escape(session.stage)
     if session.state.is_stale:

@@ -63,6 +63,7 @@ class GridTab:
         self.coloring.on_update(step(lambda: self._chosen(view.session.state)))
         for each in (self.axis, self.at):
             each.on_update(step(lambda: view.scan.draw()))
+            each.on_update(step(lambda: view.structure.draw()))
         self.tubes.on_update(step(self._light))
         self.dark.on_update(step(self._theme))
 

@@ -41,7 +41,7 @@ PLAN_FAR = 1.3  #: of the camera above a plan, so that all of it is seen [distan
 PANEL_WIDTH, USUAL_WIDTH = 452, 1280  #: of the panel; of a page that has not said its own [pixel]
 LEAST_DRAWING = 0.4  #: of a page that the drawing has beside the panel, which lies over it on narrower ones
 FIRST_SEEN_FROM = np.array([0.8, -1.4, 0.9])  #: direction from which the scan is seen first
-STEP_NAMES = ("Stop", "Undo", "Redo")
+STEP_NAMES = ("Stop", "Undo", "Redo", "See all")
 SMALL_PICTURE, PICTURE_WAIT = (
     (8, 8),
     2.0,
@@ -79,7 +79,9 @@ class StudioView(Presses):
             self.head = Head(gui)
             generate = gui.add_button("Generate", color="blue", hint="with the effort that Design says (Ctrl+Enter)")
             self.steps = gui.add_button_group(
-                "steps", STEP_NAMES, hint="what undo (Ctrl+Z) and redo (Ctrl+Y) would take is said above"
+                "steps",
+                STEP_NAMES,
+                hint="what undo (Ctrl+Z) and redo (Ctrl+Y) would take is said above; See all moves the camera back",
             )
             self.click = gui.add_dropdown("a click", (SELECT,), hint="what a click on the drawing does")
             self.row = gui.add_markdown("", visible=False)
@@ -126,7 +128,7 @@ class StudioView(Presses):
 
     def _step(self, name: str) -> None:
         session = self.session
-        dict(zip(STEP_NAMES, (session.stop, session.undo, session.redo), strict=True))[name]()
+        dict(zip(STEP_NAMES, (session.stop, session.undo, session.redo, self.see_all), strict=True))[name]()
 
     def _add_keys(self, gui: Any) -> None:
         """Let keys take steps too."""
@@ -250,6 +252,11 @@ class StudioView(Presses):
         corners = self.frame.corners
         aside = np.array([BESIDE_FIRST * DRAWN_EXTENT * (designs - 1), 0.0, 0.0])
         self.see(np.concatenate([corners, corners + aside]))
+
+    def see_all(self) -> None:
+        """Move the camera back to where all that is drawn is seen."""
+        if self.session.cloud is not None:
+            self.overview(self.compare.beside)
 
     def see(self, places: np.ndarray) -> None:
         """Move the camera so that places of the scene (N, 3) are seen."""
