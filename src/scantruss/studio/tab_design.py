@@ -9,6 +9,7 @@ from ..settings.records import EFFORTS, PREFER
 from .feature_list import FeatureList
 from .length_brush import LengthBrush
 from .rows_tool import RowsTool
+from .scale import set_scale
 from .trade_tool import TradeTool
 
 if TYPE_CHECKING:
@@ -60,7 +61,7 @@ class DesignTab:
         if cloud is not None and (before is None or before.cloud is not cloud):
             low, high = (float(f"{bound:.3g}") for bound in session.length_bounds())
             step = float(f"{(high - low) / SLIDER_STEPS or 1.0:.1g}")
-            self.slider.min, self.slider.max, self.slider.step = low, max(high, low + step), step
+            set_scale(self.slider, low, max(high, low + step), step)
         if before is None or before.settings is not settings or before.cloud is not cloud:
             if abs(self.slider.value - settings.length) > 1e-9 * settings.length:
                 self.slider.value = min(max(settings.length, self.slider.min), self.slider.max)

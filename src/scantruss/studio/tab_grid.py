@@ -12,6 +12,7 @@ from .colours import BRUSHED, DIMMED, colors_of, histogram_of, legend_of, legend
 from .drawn_lines import numbers_of
 from .frame import SectionPlane
 from .pictures import PictureTool
+from .scale import round_ends, set_scale
 from .scene import (
     BALL_RADIUS,
     FAINT,
@@ -99,7 +100,7 @@ class GridTab:
             _, low, high = colors_of(values, middle)
             self._values = values
             begin, end, step = round_ends(low, high)
-            self.range.min, self.range.max, self.range.step = begin, end, step
+            set_scale(self.range, begin, end, step)
             self.range.value = begin, end
             self.view.show_text(self.between, "")
             self.legend.content = legend_of(self.coloring.value, column.unit, low, high, middle is not None)
@@ -219,10 +220,3 @@ class GridTab:
         )
         if self.tubes.value:
             self._light()
-
-
-def round_ends(low: float, high: float) -> tuple[float, float, float]:
-    """Return round numbers around the ends of a scale, and a round step of about a 200th of it."""
-    step = 10.0 ** np.floor(np.log10((high - low) / 100 or 0.01))
-    begin, end = np.floor(low / step), np.floor(high / step) + 1
-    return float(f"{begin * step:.12g}"), float(f"{end * step:.12g}"), float(f"{step:.12g}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from typing import TYPE_CHECKING, Any
 
@@ -261,13 +262,17 @@ class StructureTab:
         change, factor, _ = moved
         places, members = self.view.places(shown[0]), shown[0].members
         members = members[self._kept(places)[members].all(axis=1)]
-        handle = self.view.scene.api.get_handle_by_name("/moved")
+        scene = self.view.scene.api
+        handle = scene.get_handle_by_name("/moved")
         step = self._in_scene(change, factor)
         if handle is None:
             raise InputError("nothing that moves is on the drawn side of the section")
         began = time.monotonic()
-        while (spent := time.monotonic() - began) < ANIMATION_SECONDS and self.view.session.state is state:
+        while (spent := time.monotonic() - began) < ANIMATION_SECONDS:
+            if scene.get_handle_by_name("/moved") is not handle:  # another shape is drawn meanwhile
+                return
             swing = np.float32(np.sin(2 * np.pi * SWINGS * spent / ANIMATION_SECONDS))
-            handle.points = (places + swing * step)[members]
+            with contextlib.suppress(RuntimeError):  # of one that has just been removed
+                handle.points = (places + swing * step)[members]
             time.sleep(FRAME_SECONDS)
         self._draw(state)
