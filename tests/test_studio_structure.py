@@ -4,6 +4,7 @@ import io
 import json
 from pathlib import Path
 
+import numpy as np
 import openpyxl
 import pytest
 import trimesh
@@ -11,6 +12,7 @@ from studio_dome import done, session_of_dome
 
 import scantruss as st
 from scantruss.cli.main import main
+from scantruss.export.formats import model_of
 from scantruss.export.page_tables import colorings_of, tables_of
 from scantruss.studio.further_files import FURTHER_FILES, PRINTED, PRINTED_BALL, SCHEDULES, further_files
 from scantruss.studio.outputs import settings_files
@@ -87,6 +89,16 @@ def test_a_structure_has_the_colourings_of_its_grid_too(tmp_path: Path) -> None:
     assert all(len({len(each.values) for each in table}) == 1 for table in structure.values())
     other = session_of_dome(tmp_path, 5.0).grid  # with other members: its columns would be of other parts
     assert "fold" not in [each.name for each in tables_of(session.model("structure"), other)["members"]]
+
+
+def test_coordinates_far_from_the_origin_keep_their_digits(tmp_path: Path) -> None:
+    grid = session_of_dome(tmp_path, 6.0).grid
+    assert grid is not None
+    away = grid.replace(origin=grid.origin + [674_580.25, 5_206_750.125, 653.5])
+    for each in (grid, away):
+        columns = {one.name: np.array(one.values) for one in tables_of(model_of(each))["nodes"] if one.name in "xyz"}
+        read = np.stack([columns[axis] for axis in "xyz"], axis=1)
+        assert np.abs(read - each.scan_nodes).max() < 1e-4
 
 
 def test_a_number_of_sections_that_is_none_is_refused() -> None:

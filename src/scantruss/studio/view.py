@@ -191,7 +191,7 @@ class StudioView(Presses):
             (each.name, each.values[number], each.unit) for each in tables[kind] if each.values[number] is not None
         ]
         words = " · ".join(
-            f"{name} **{value:.6g}** {unit}" if isinstance(value, float) else f"{name} **{value}**"
+            f"{name} **{value:.15g}** {unit}" if isinstance(value, float) else f"{name} **{value}**"
             for name, value, unit in cells
         )
         self.row.content = words
