@@ -4,10 +4,9 @@ import io
 import socket
 import subprocess
 import sys
-import time
 import urllib.error
 import urllib.request
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -18,40 +17,21 @@ import pytest
 import trimesh
 from browser import open_page
 from PIL import Image
+from studio_person import choose, drag, field, free_port, served_dome, tab, until, write_dome
 
 import scantruss as st
 from scantruss.cli.main import main
-from scantruss.studio.browsers import Browsers
 from scantruss.studio.colours import colors_of
 from scantruss.studio.scan_steps import LARGEST_UPLOAD, TOO_LARGE
-from scantruss.studio.server import PAGE_SCRIPTS, Guard, address_to_open, serve_browsers, start_server
+from scantruss.studio.server import PAGE_SCRIPTS, Guard, address_to_open, start_server
 from scantruss.studio.session import Session
-
-
-def free_port() -> int:
-    """Return a port that nobody uses."""
-    with socket.socket() as trial:
-        trial.bind(("127.0.0.1", 0))
-        return int(trial.getsockname()[1])
 
 
 @pytest.fixture
 def served(tmp_path: Path) -> Iterator[tuple[str, Session]]:
     """Serve a studio with a shallow dome."""
-    pytest.importorskip("viser", reason="viser is not installed")
-    x, y = (each.ravel() for each in np.meshgrid(np.linspace(0, 10, 60), np.linspace(0, 10, 60)))
-    points = np.stack([x, y, 2 - 0.04 * ((x - 5) ** 2 + (y - 5) ** 2)], axis=1)
-    session = Session(tmp_path / "dome.scantruss")
-    np.savetxt(tmp_path / "dome.xyz", points)
-    session.open(tmp_path / "dome.xyz")
-    session.set_unit("m")
-    server, _ = start_server("127.0.0.1", free_port())
-    try:
-        serve_browsers(server, Browsers(session))
-        yield f"http://127.0.0.1:{server.get_port()}/", session
-    finally:
-        session.stop()
-        server.stop()
+    with served_dome(tmp_path) as (address, session, _):
+        yield address, session
 
 
 def status(address: str, **head: str) -> int:
@@ -161,12 +141,6 @@ def test_colours_span_the_values() -> None:
 SMALL = {"width": 700, "height": 420}
 
 
-def choose(page: Any, old: str, new: str) -> None:
-    """Choose something else in a drop-down list, as a person does."""
-    page.locator(f"input[value='{old}']:visible").first.click()
-    page.get_by_role("option", name=new, exact=True).first.click()
-
-
 def shown_colors(page: Any) -> np.ndarray:
     """Return the pixels (N, 3) of the drawing."""
     picture = Image.open(io.BytesIO(page.screenshot(clip={"x": 0, "y": 160, "width": 880, "height": 550})))
@@ -178,43 +152,6 @@ def is_orange(pixels: np.ndarray) -> np.ndarray:
     red, green, blue = pixels.T
     found: np.ndarray = (red > 150) & (green > 0.3 * red) & (green < 0.62 * red) & (blue < 0.25 * red)
     return found
-
-
-def drag(page: Any, begin: tuple[float, float], end: tuple[float, float]) -> None:
-    """Drag from one place of the page to another."""
-    page.mouse.move(*begin)
-    page.mouse.down()
-    page.mouse.move(*end, steps=8)
-    page.wait_for_timeout(400)
-    page.mouse.up()
-
-
-def until(holds: Callable[[], bool], seconds: float = 30.0) -> bool:
-    """Wait until something holds; whether it does."""
-    end = time.monotonic() + seconds
-    while not holds() and time.monotonic() < end:  # ends: time passes
-        time.sleep(0.05)
-    return holds()
-
-
-def press(page: Any, selector: str, came: Callable[[], bool]) -> None:
-    """Click until something comes of it, three times at most: on a loaded machine a click is lost now and then."""
-    for _ in range(3):
-        page.click(selector)
-        if until(came, 15.0):
-            return
-    raise AssertionError(f"nothing comes of {selector}")
-
-
-def tab(page: Any, name: str) -> None:
-    """Go to a step."""
-    page.click(f"[role=tab]:has-text('{name}')")
-    page.wait_for_timeout(200)
-
-
-def field(page: Any, name: str) -> Any:
-    """Return the text field, box or list with a label."""
-    return page.locator(f"xpath=//label[normalize-space(.)='{name}']/following::input[1]").first
 
 
 def downloaded(page: Any, kind: str, old: str, suffix: str, folder: Path) -> Path:
@@ -261,9 +198,8 @@ def test_a_person_makes_a_grid_and_a_structure(served: tuple[str, Session], tmp_
         page.wait_for_selector("text=(quick, not saved)")
         length = float(f"{1.1 * session.settings.length:.3g}")
         field(page, "exactly").fill(f"{length:g}")
-        press(
-            page, "button:has-text('Generate')", lambda: session.grid is not None and not session.state.is_live
-        )  # at once
+        page.click("button:has-text('Generate')")  # at once
+        page.wait_for_selector("text=undo: generate")
         page.wait_for_selector("text=(quick, not saved)", state="detached")
         assert session.grid is not None and session.grid.settings is not None
         assert session.settings.length == session.grid.settings.length == length
@@ -280,8 +216,8 @@ def test_a_person_makes_a_grid_and_a_structure(served: tuple[str, Session], tmp_
         tab(page, "Design")
         page.click("text=Few different parts")
         field(page, "tolerance").fill("20%")
-        press(page, "button:has-text('Find the trade')", lambda: session.state.trade is not None)
-        press(page, "svg [data-low='5'] rect", lambda: session.grid is not None and session.grid.alike is not None)
+        page.click("button:has-text('Find the trade')")
+        page.click("svg [data-low='5'] rect")
         page.wait_for_selector("text=undo: 5 lengths")
         assert session.worker.wait(60) and session.grid.alike is not None and session.grid.alike.count == 5
         page.click("button:has-text('Undo')")
@@ -357,38 +293,94 @@ def test_a_person_makes_a_grid_and_a_structure(served: tuple[str, Session], tmp_
         assert errors == []
 
 
-def test_a_server_that_is_killed_loses_nothing_but_what_it_was_at(tmp_path: Path) -> None:
+class Served:
+    """A studio in a process of its own, which can be killed and begun again."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder, self._port = folder, free_port()
+        self._process: subprocess.Popen[str] | None = None
+        self.address = f"http://127.0.0.1:{self._port}/"
+
+    def begin(self, source: str) -> None:
+        """Serve a scan or a project."""
+        command = [sys.executable, "-m", "scantruss", "studio", source, "--port", str(self._port), "--no-open"]
+        self._process = subprocess.Popen(command, cwd=self._folder, stdout=subprocess.PIPE, text=True)
+        assert self._process.stdout is not None and "studio at" in self._process.stdout.readline()
+
+    def kill(self) -> None:
+        """Kill the server at once, whatever it is at."""
+        if self._process is not None:
+            self._process.kill()
+            self._process.communicate(timeout=30)
+
+
+@pytest.fixture
+def killable(tmp_path: Path) -> Iterator[Served]:
+    """Give a studio of a shallow dome that has not begun."""
     pytest.importorskip("viser", reason="viser is not installed")
-    x, y = (each.ravel() for each in np.meshgrid(np.linspace(0, 10, 60), np.linspace(0, 10, 60)))
-    np.savetxt(tmp_path / "dome.xyz", np.stack([x, y, 2 - 0.04 * ((x - 5) ** 2 + (y - 5) ** 2)], axis=1))
-    port = free_port()
-
-    def begin(source: str) -> subprocess.Popen[str]:
-        command = [sys.executable, "-m", "scantruss", "studio", source, "--port", str(port), "--no-open"]
-        process = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, text=True)
-        assert process.stdout is not None and "studio at" in process.stdout.readline()
-        return process
-
-    def kill(process: subprocess.Popen[str]) -> None:
-        process.kill()
-        process.communicate(timeout=30)
-
-    process = begin("dome.xyz")
+    write_dome(tmp_path)
+    server = Served(tmp_path)
     try:
-        with open_page(f"http://127.0.0.1:{port}/") as (page, _):
-            page.set_viewport_size(SMALL)
-            page.wait_for_selector("text=Generate")
-            tab(page, "Design")
-            page.click("button:has-text('Generate')")
-            page.wait_for_selector("text=undo: generate")
-            said = page.inner_text("p:has-text('members')").partition("\n")[0]
-            kill(process)
-            process = begin("dome.scantruss")
-            page.goto(f"http://127.0.0.1:{port}/")
-            tab(page, "Design")
-            page.wait_for_selector(f"text={said.strip()}")
+        yield server
     finally:
-        kill(process)
+        server.kill()
+
+
+def test_a_server_that_is_killed_loses_nothing_but_what_it_was_at(killable: Served) -> None:
+    killable.begin("dome.xyz")
+    with open_page(killable.address) as (page, _):
+        page.set_viewport_size(SMALL)
+        page.wait_for_selector("text=Generate")
+        tab(page, "Design")
+        page.click("button:has-text('Generate')")
+        page.wait_for_selector("text=undo: generate")
+        said = page.inner_text("p:has-text('members')").partition("\n")[0]
+        killable.kill()
+        killable.begin("dome.scantruss")
+        page.goto(killable.address)
+        tab(page, "Design")
+        page.wait_for_selector(f"text={said.strip()}")
+
+
+def test_a_server_that_is_killed_in_a_run_of_the_structure_keeps_grid_and_structure(
+    killable: Served, tmp_path: Path
+) -> None:
+    write_dome(tmp_path, 120)
+    killable.begin("dome.xyz")
+    with open_page(killable.address) as (page, _):
+        page.set_viewport_size(SMALL)
+        page.wait_for_selector("text=Generate")
+        choose(page, "not known", "m")
+        tab(page, "Design")
+        field(page, "exactly").fill("0.4")  # many members, whose sizing takes a while
+        page.click("button:has-text('Generate')")
+        page.wait_for_selector("text=undo: generate", timeout=120_000)
+        said = page.inner_text("p:has-text('members')").partition("\n")[0]
+        tab(page, "Structure")
+        page.click("button:has-text('Run')")
+        page.wait_for_selector("text=undo: run", timeout=120_000)
+        figures = page.inner_text("p:has-text('mass without nodes')")
+        page.click("text=Sizing and modes")
+        page.wait_for_timeout(500)
+        field(page, "section").fill("CHS139.7x5")
+        field(page, "size").fill("6")
+        page.click("button:has-text('Run')")
+        page.wait_for_selector("[role=status]:has-text('weight curve')", timeout=120_000)
+        killable.kill()
+        assert not list(tmp_path.glob("*.tmp*")), "nothing half written is left"
+        killable.begin("dome.scantruss")
+        page.goto(killable.address)
+        page.wait_for_selector("text=The structure was solved before the last change", timeout=60_000)
+        tab(page, "Design")
+        page.wait_for_selector(f"text={said.strip()}")
+        tab(page, "Structure")
+        assert page.inner_text("p:has-text('mass without nodes')") == figures
+        page.click("text=Sizing and modes")
+        assert (field(page, "section").input_value(), field(page, "size").input_value()) == ("CHS139.7x5", "6")
+        field(page, "size").fill("0")
+        page.click("button:has-text('Run')")
+        page.wait_for_selector("text=undo: run", timeout=120_000)
+        page.wait_for_selector("[role=status]:has-text('ready')")
 
 
 def test_a_click_on_what_is_said_on_the_drawing_reaches_the_drawing(served: tuple[str, Session]) -> None:

@@ -30,9 +30,9 @@ from scantruss.studio.outputs import TAKEN, command_of, settings_files
 from scantruss.studio.pictures import about_z, angle_to_see, facing, over
 from scantruss.studio.project import save_project
 from scantruss.studio.remove_tool import seen_within
+from scantruss.studio.scale import decimals_of, round_ends, set_scale
 from scantruss.studio.scene import BARB_WIDTH, barbed, spread
 from scantruss.studio.session import Session
-from scantruss.studio.tab_grid import round_ends
 
 RNG = np.random.default_rng(7)
 X, Y = (each.ravel() for each in np.meshgrid(np.linspace(0, 9, 40), np.linspace(0, 7, 30)))
@@ -351,3 +351,12 @@ def test_bars_stand_for_the_values_that_they_hold() -> None:
     assert held == [(1, 1.0, 1.0), (2, 2.0, 2.0), (1, 2.4, 2.4), (1, 3.0, 3.0), (1, 9.0, 9.0)]
     clear = [float(low) for count, low, _, opacity in bars if int(count) and opacity == "1"]
     assert clear == [2.0, 2.4, 3.0]
+
+
+def test_a_slider_has_as_many_decimals_as_its_step_needs() -> None:
+    assert [decimals_of(step) for step in (100.0, 1.0, 0.5, 0.02, 0.001, 3e-7)] == [0, 0, 1, 2, 3, 7]
+    slider = SimpleNamespace(
+        min=0.5, max=2.0, step=0.01, precision=2
+    )  # of lengths of metres, before a small scan is opened
+    set_scale(slider, 0.0133, 0.12, 0.001)
+    assert round(0.041, slider.precision) == 0.041 and (slider.min, slider.max, slider.step) == (0.0133, 0.12, 0.001)

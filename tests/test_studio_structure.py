@@ -4,6 +4,7 @@ import io
 import json
 from pathlib import Path
 
+import numpy as np
 import openpyxl
 import pytest
 import trimesh
@@ -11,6 +12,8 @@ from studio_dome import done, session_of_dome
 
 import scantruss as st
 from scantruss.cli.main import main
+from scantruss.export.formats import model_of
+from scantruss.export.page_tables import colorings_of, tables_of
 from scantruss.studio.further_files import FURTHER_FILES, PRINTED, PRINTED_BALL, SCHEDULES, further_files
 from scantruss.studio.outputs import settings_files
 from scantruss.studio.session import Session
@@ -68,6 +71,34 @@ def test_scales_and_weights_are_words_of_the_page() -> None:
         with pytest.raises(ValueError):
             scale_of_text(text)
     assert "12,300 kg" in weight_bars({1: 12300.0, 2: 9000.0})
+
+
+def test_a_structure_has_the_colourings_of_its_grid_too(tmp_path: Path) -> None:
+    session = session_of_dome(tmp_path, 6.0)
+    session.run_structure()
+    done(session)
+    grid = session.grid
+    assert grid is not None and grid.settings is not None and session.solution is not None
+    plain, structure = tables_of(session.model("grid")), tables_of(session.model("structure"), grid)
+    offered = [(one["kind"], one["name"]) for one in colorings_of(structure)]
+    assert set(offered) >= {(one["kind"], one["name"]) for one in colorings_of(plain)}
+    assert {("members", "utilization"), ("members", "fold"), ("members", "length / desired")} <= set(offered)
+    columns = [{each.name: each.values for each in tables["members"]} for tables in (plain, structure)]
+    for name in ("fold", "length / desired"):
+        assert columns[0][name] == columns[1][name]
+    assert all(len({len(each.values) for each in table}) == 1 for table in structure.values())
+    other = session_of_dome(tmp_path, 5.0).grid  # with other members: its columns would be of other parts
+    assert "fold" not in [each.name for each in tables_of(session.model("structure"), other)["members"]]
+
+
+def test_coordinates_far_from_the_origin_keep_their_digits(tmp_path: Path) -> None:
+    grid = session_of_dome(tmp_path, 6.0).grid
+    assert grid is not None
+    away = grid.replace(origin=grid.origin + [674_580.25, 5_206_750.125, 653.5])
+    for each in (grid, away):
+        columns = {one.name: np.array(one.values) for one in tables_of(model_of(each))["nodes"] if one.name in "xyz"}
+        read = np.stack([columns[axis] for axis in "xyz"], axis=1)
+        assert np.abs(read - each.scan_nodes).max() < 1e-4
 
 
 def test_a_number_of_sections_that_is_none_is_refused() -> None:

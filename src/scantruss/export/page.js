@@ -204,7 +204,7 @@
     if (selected) for (const one of data.tables[kind]) {
       const row = table.insertRow(), head = row.appendChild(document.createElement("th"));
       head.textContent = one.unit ? `${one.name} [${one.unit}]` : one.name;
-      row.insertCell().textContent = words(one.values[k]);
+      row.insertCell().textContent = "xyz".includes(one.name) ? String(one.values[k]) : words(one.values[k]);
     }
     $("row").replaceChildren(selected ? table : "Click a node, member or panel, or type its mark.");
     redraw();

@@ -33,6 +33,9 @@ COLORINGS: tuple[tuple[str, str, str, float | None], ...] = (  # kind, column, w
 )
 
 
+COLUMN_DIGITS, MOST_PLACE_DIGITS = 6, 15  #: of a number; of a coordinate far from the origin
+
+
 class PageColumn(NamedTuple):
     """A column of a table in the page."""
 
@@ -44,18 +47,18 @@ class PageColumn(NamedTuple):
 Tables = dict[str, list[PageColumn]]
 
 
-def column(name: str, unit: str, values: Iterable[Any] | np.ndarray) -> PageColumn:
-    """Return a column of plain values; NaN becomes None, and numbers keep six digits."""
+def column(name: str, unit: str, values: Iterable[Any] | np.ndarray, digits: int = COLUMN_DIGITS) -> PageColumn:
+    """Return a column of plain values; NaN becomes None, and numbers keep so many digits."""
     plain = values.tolist() if isinstance(values, np.ndarray) else list(values)
     if not any(isinstance(value, float) for value in plain):
         return PageColumn(name, unit, plain)
     if not all(isinstance(value, float) and math.isfinite(value) for value in plain):
-        return PageColumn(name, unit, [_short(value) if isinstance(value, float) else value for value in plain])
-    return PageColumn(name, unit, list(map(float, ("%.6g " * len(plain) % tuple(plain)).split())))
+        return PageColumn(name, unit, [_short(value, digits) if isinstance(value, float) else value for value in plain])
+    return PageColumn(name, unit, list(map(float, (f"%.{digits}g " * len(plain) % tuple(plain)).split())))
 
 
-def _short(value: float) -> float | None:
-    return float(f"{value:.6g}") if math.isfinite(value) else None
+def _short(value: float, digits: int) -> float | None:
+    return float(f"{value:.{digits}g}") if math.isfinite(value) else None
 
 
 class Pin(NamedTuple):
@@ -66,12 +69,19 @@ class Pin(NamedTuple):
     where: tuple[float, float, float]  #: in the scan's own frame [scan unit]
 
 
-def tables_of(model: Model) -> Tables:
-    """Return the columns of nodes, members and panels, the marks first; coordinates in the frame of the scan."""
+def tables_of(model: Model, made_of: Grid | None = None) -> Tables:
+    """Return the columns of nodes, members and panels, the marks first; coordinates in the frame of the scan.
+
+    Parameters
+    ----------
+    made_of : Grid, optional
+        What a structure was made of, whose columns come too where it has the same nodes and members.
+    """
     unit, ends, corners = model.unit, model.members, model.panels
     valence = np.bincount(ends.ravel(), minlength=len(model.local))
     nodes = [column("node", "", model.node_marks)]
-    nodes += [column(axis, unit, model.nodes[:, k]) for k, axis in enumerate("xyz")]
+    digits = digits_of_places(model.nodes)
+    nodes += [column(axis, unit, model.nodes[:, k], digits) for k, axis in enumerate("xyz")]
     nodes.append(column("members", "", valence))
     members = [
         column("member", "", model.member_marks),
@@ -93,12 +103,25 @@ def tables_of(model: Model) -> Tables:
         held = np.isin(np.arange(len(model.local)), model.supported)
         nodes.append(column("support", "", ["yes" if each else "no" for each in held.tolist()]))
         members += _of_structure(model)
-    elif model.grid is not None:
-        nodes += _of_grid(model.grid)
-        members += _members_of_grid(model.grid)
-        nodes += _kinds_of_grid(model.grid, JOINTS)
-        panels += _kinds_of_grid(model.grid, PANELS)
+    grid = model.grid if model.truss is None else made_of
+    if grid is not None and np.array_equal(np.sort(grid.edges), np.sort(model.members)):
+        nodes += _of_grid(grid)
+        members += _members_of_grid(grid)
+        nodes += _kinds_of_grid(grid, JOINTS)
+        panels += _kinds_of_grid(grid, PANELS)
     return {"nodes": nodes, "members": members, "panels": panels}
+
+
+def digits_of_places(places: np.ndarray) -> int:
+    """Return how many digits coordinates (N, 3) need, so that far from the origin six are left within their extent."""
+    if not len(places):
+        return COLUMN_DIGITS
+    extent, far = float(np.ptp(places, axis=0).max()), float(np.abs(places).max())
+    return (
+        min(COLUMN_DIGITS + max(0, math.ceil(math.log10(far / extent))), MOST_PLACE_DIGITS)
+        if extent > 0
+        else MOST_PLACE_DIGITS
+    )
 
 
 def _marks(model: Model, ids: np.ndarray) -> list[str]:

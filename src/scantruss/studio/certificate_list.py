@@ -23,7 +23,7 @@ class CertificateList:
         self.view = view
         self.words = gui.add_markdown(NO_GRID_YET)
         self.pins = gui.add_checkbox("draw pins", False)
-        self.places = gui.add_dropdown("place", ("-",))
+        self.places = gui.add_dropdown("place", ("-",), hint="numbered as the pins")
         fly = gui.add_button("Fly there")
         self._pins: list[Pin] = []
         self._drawn = 0
@@ -52,7 +52,7 @@ class CertificateList:
         if count:
             places = self.view.frame.to_scene(np.array([pin.where for pin in self._pins]))
             for k, place in enumerate(places.tolist()):
-                scene.api.add_label(f"/pins/{k}", f"{k + 1} {self._pins[k].words}", position=tuple(place))
+                scene.api.add_label(f"/pins/{k}", f"{k + 1}", position=tuple(place))
 
     def _fly(self) -> None:
         number = int(self.places.value.partition(" ")[0]) - 1 if self.places.value[0].isdigit() else -1

@@ -32,7 +32,7 @@ class CleanTool:
         self.about = gui.add_markdown("")
         remove = gui.add_button("Remove what is red")
         self._drawn: Cleaning | None = None
-        buttons.on_click(view.step(lambda: self._show() if buttons.value == "Show what goes" else self._keep()))
+        buttons.on_click(view.chosen(lambda way: self._show() if way == "Show what goes" else self._keep()))
         remove.on_click(view.step(view.session.clean))
 
     def _show(self) -> None:

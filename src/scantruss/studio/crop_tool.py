@@ -36,7 +36,7 @@ class CropTool:
         take = gui.add_button("Crop", color="blue")
         self._handles: list[Any] = []
         self._corners: list[tuple[float, float]] = []
-        ways.on_click(view.step(lambda: {"Box": self._box, "Polygon": self._polygon, "All": self._all}[ways.value]()))
+        ways.on_click(view.chosen(lambda way: {"Box": self._box, "Polygon": self._polygon, "All": self._all}[way]()))
         take.on_click(view.step(self._take))
         view.modes[CROP_MODE] = self._corner
 

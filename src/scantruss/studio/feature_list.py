@@ -50,9 +50,12 @@ class FeatureList:
         places = np.concatenate([frame.to_scene(each.points) for each in features])
         owner = np.repeat(np.arange(len(features)), [len(each.points) for each in features])
         found = nearest_point(places, origin, ahead)
-        if found is None:
+        if found is not None:
+            self.view.session.switch(int(owner[found]))
+        elif (part := self.view.under(origin, ahead)) is not None:
+            self.view.select(*part)
+        else:
             raise InputError("no hole or ridge is there; click on its line")
-        self.view.session.switch(int(owner[found]))
 
     def fill(self, before: StudioState | None, state: StudioState) -> None:
         """Show the holes and ridges of a state."""

@@ -36,7 +36,7 @@ class FixedNodes:
         by_click.on_click(view.step(lambda: setattr(view.click, "value", FIX_MODE)))
         view.modes[FIX_MODE] = self.place
         self.chosen.on_update(view.step(self._choose))
-        ways.on_click(view.step(lambda: self._do(ways.value)))
+        ways.on_click(view.chosen(self._do))
 
     def _do(self, way: str) -> None:
         if way == FIX_WAYS[2]:

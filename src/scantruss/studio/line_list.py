@@ -40,8 +40,8 @@ class LineList:
         self._points: list[np.ndarray] = []
         self._count = 0
         draw.on_click(view.step(self._begin))
-        ways.on_click(view.step(lambda: self._go_on(ways.value)))
-        typed.on_click(view.step(lambda: self._typed(typed.value)))
+        ways.on_click(view.chosen(self._go_on))
+        typed.on_click(view.chosen(self._typed))
         self.chosen.on_update(view.step(lambda: self._draw(view.session.state)))
         view.modes[DRAW_MODE] = self._click
 

@@ -40,18 +40,23 @@ const give = (name, low, high) => {
   while (around && !around.querySelector("input")) around = around.parentElement;
   const input = around?.querySelector("input");
   if (!input) return;
-  Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value").set.call(input, low === high ? `${low}` : `${low}, ${high}`);
+  const text = low === high ? `${low}` : `${low}, ${high}`;
+  const typed = text === input.value ? `${text} ` : text;  // which counts again
+  Object.getOwnPropertyDescriptor(HTMLInputElement.prototype, "value").set.call(input, typed);
   input.dispatchEvent(new Event("input", { bubbles: true }));
 };
 const least = (...parts) => parts.reduce((one, other) => (+other.dataset.low < +one.dataset.low ? other : one)).dataset.low;
 const most = (...parts) => parts.reduce((one, other) => (+other.dataset.high > +one.dataset.high ? other : one)).dataset.high;
-let pressed = null;
+const DRAGGED = 4;  // a pointer that has moved less means where it began, for the picture may have changed under it [pixel]
+let pressed = null, from = [0, 0];
 addEventListener("pointerdown", (event) => {
   pressed = event.target.closest?.("[data-field]");
+  from = [event.clientX, event.clientY];
   if (pressed) event.preventDefault();
 });
 addEventListener("pointerup", (event) => {
-  const end = event.target.closest?.("[data-field]"), begin = pressed;
+  const begin = pressed, isDragged = Math.hypot(event.clientX - from[0], event.clientY - from[1]) > DRAGGED;
+  const end = isDragged ? event.target.closest?.("[data-field]") : begin;
   pressed = null;
   if (begin && end?.dataset.field === begin.dataset.field) give(begin.dataset.field, least(begin, end), most(begin, end));
 });

@@ -29,7 +29,7 @@ class PictureTool:
 
     def __init__(self, view: StudioView, gui: Any) -> None:
         self.view = view
-        gui.add_button("Picture, 3840 x 2160").on_click(view.step(self._picture))
+        gui.add_button("Picture, 3840 x 2160").on_click(view.aside(self._picture))
         gui.add_button("Turntable, GIF").on_click(view.step(self._turntable))
 
     def _picture(self) -> None:

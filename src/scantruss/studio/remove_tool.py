@@ -31,7 +31,7 @@ class RemoveTool:
         self._marked: np.ndarray | None = None
         self._listens = False
         steps = dict(zip(REMOVE_WAYS, (self._start, self._unmark, self._remove), strict=True))
-        ways.on_click(view.step(lambda: steps[ways.value]()))
+        ways.on_click(view.chosen(lambda way: steps[way]()))
         restore.on_click(view.step(view.session.restore_points))
 
     def _start(self) -> None:

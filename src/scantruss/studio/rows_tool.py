@@ -37,7 +37,7 @@ class RowsTool:
         self._balls = DraggedBalls(view, "/rows ends", self._drop, self._show)
         draw.on_click(view.step(self._start))
         none.on_click(view.step(lambda: view.session.set("no arrow", rows_along=())))
-        self.words.on_update(view.typed(self._typed))
+        view.typed(self.words, self._typed)
         view.modes[ROWS_MODE] = self._click
 
     def _start(self) -> None:
@@ -84,7 +84,7 @@ class RowsTool:
         arrow = tuple(state.settings.rows_along)
         if before is not None and tuple(before.settings.rows_along) == arrow and before.cloud is state.cloud:
             return
-        self.words.value = ", ".join(f"{number:.7g}" for number in arrow)
+        self.view.show_text(self.words, ", ".join(f"{number:.7g}" for number in arrow))
         self.view.scene.remove("/rows", "/rows arrow", "/rows ends")
         if not arrow or state.cloud is None:
             return

@@ -27,7 +27,7 @@ SOMEWHERE = {
 }  #: addresses of examples (RFC 5737, 3849), by what listens everywhere
 COOKIE = "scantruss_studio"
 BROWSER_KEY = "scantruss_browser"
-PAGE_SCRIPTS = tuple(Path(__file__).with_name(name) for name in ("page_script.js", "page_keys.js"))
+PAGE_SCRIPTS = tuple(Path(__file__).with_name(name) for name in ("page_script.js", "page_keys.js", "page_presses.js"))
 STORAGE_PATIENCE = 5.0  #: how long a browser may take to say who it is [s]
 Handler = Callable[[Any, Any], Any]
 

@@ -55,7 +55,10 @@ class Session(TradeSteps):
         InputError
             A value cannot be used.
         """
-        self.change(words, settings=self.settings.replace(**changes))
+        settings = self.settings.replace(**changes)
+        if settings == self.settings and self.grid is not None:
+            return
+        self.change(words, settings=settings)
         self.save()
         self.tell()
         self._ask_live()
@@ -123,7 +126,7 @@ class Session(TradeSteps):
 
     def _look_for_features(self) -> None:
         if self.wants_features:
-            self.worker.ask(self._find_features, quick=True)
+            self.worker.ask(self._find_features, quick=True, then=True)
 
     def _show_again(self) -> None:
         if not self.show_quick():  # which looks for them too

@@ -24,6 +24,10 @@ PANEL_STYLE = """<style>
 .mantine-Notification-closeButton { pointer-events: auto }
 :is(.mantine-Input-input, .mantine-Checkbox-input:not(:checked)) { border-color: #868e96 !important }
 [data-mantine-color-scheme="dark"] .mantine-Checkbox-input:checked { border-color: #8cc4f8 !important }
+.studio-head { padding: .3em .8em 0; line-height: 1.35; font-size: .95em }
+.studio-head > [role="status"] { height: 2.7em; overflow-y: auto }
+.studio-refused { font-size: .85em; line-height: 1.06 }
+.studio-head > small { display: block; overflow: hidden; text-overflow: ellipsis; white-space: nowrap }
 pre { white-space: pre-wrap !important; overflow-wrap: anywhere }
 .mantine-ScrollArea-viewport { overflow-x: hidden !important }
 .mantine-ScrollArea-viewport > div { padding-right: 7px }

@@ -54,7 +54,7 @@ class SymmetryTool:
         draw.on_click(view.step(self._start))
         view.modes[PLANE_MODE] = self._click
         self.way.on_update(view.step(self._set))
-        self.words.on_update(view.typed(lambda: self._set() if self.way.value == SYMMETRIES[-1] else None))
+        view.typed(self.words, lambda: self._set() if self.way.value == SYMMETRIES[-1] else None)
 
     def _set(self) -> None:
         way, session = self.way.value, self.view.session
@@ -109,7 +109,7 @@ class SymmetryTool:
         if not same:
             self.way.value = asked if asked in SYMMETRIES_FOUND else SYMMETRIES[-1 if asked else 0]
             if asked and not isinstance(asked, str):
-                self.words.value = ", ".join(f"{number:.7g}" for number in asked[0])
+                self.view.show_text(self.words, ", ".join(f"{number:.7g}" for number in asked[0]))
         if same and before is not None and before.grid is state.grid and before.cloud is state.cloud:
             return
         made = state.grid.settings.symmetry if state.grid is not None and state.grid.settings is not None else ()

@@ -41,8 +41,13 @@ class CompareTab:
 
     def _choose(self) -> None:
         self._draw(self.view.session.state)
-        self.view.overview(1 if self.other.value == NO_OTHER or self.over.value else 2)
+        self.view.overview(self.beside)
         self.view.look.draw()
+
+    @property
+    def beside(self) -> int:
+        """How many designs are drawn beside one another."""
+        return 1 if self.other.value == NO_OTHER or self.over.value else 2
 
     def _lay_over(self) -> None:
         self.distance.value = self.over.value

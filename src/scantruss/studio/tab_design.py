@@ -9,6 +9,7 @@ from ..settings.records import EFFORTS, PREFER
 from .feature_list import FeatureList
 from .length_brush import LengthBrush
 from .rows_tool import RowsTool
+from .scale import set_scale
 from .trade_tool import TradeTool
 
 if TYPE_CHECKING:
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
     from .view import StudioView
 
 SLIDER_STEPS = 100
+NO_WORDS = "&nbsp;"  #: of a paragraph
 
 
 class DesignTab:
@@ -36,14 +38,14 @@ class DesignTab:
             self.brush = LengthBrush(view, gui)
         with gui.add_folder("Few different parts", expand_by_default=False):
             self.trade = TradeTool(view, gui)
-        self.slider.on_update(step(self._slide))
-        self.length.on_update(view.typed(self._typed))
+        self.slider.on_update(view.slid(self._slide))
+        view.typed(self.length, self._typed)
         self.effort.on_update(step(lambda: session.set_quietly("effort", effort=self.effort.value)))
         self.prefer.on_update(step(lambda: session.set("prefer", prefer=self.prefer.value)))
 
     def _slide(self) -> None:
         length = float(f"{self.slider.value:.4g}")
-        self.length.value = f"{length:g}"
+        self.view.show_text(self.length, f"{length:g}")
         self.view.session.live(length)
 
     def _typed(self) -> None:
@@ -59,15 +61,12 @@ class DesignTab:
         if cloud is not None and (before is None or before.cloud is not cloud):
             low, high = (float(f"{bound:.3g}") for bound in session.length_bounds())
             step = float(f"{(high - low) / SLIDER_STEPS or 1.0:.1g}")
-            self.slider.min, self.slider.max, self.slider.step = low, max(high, low + step), step
+            set_scale(self.slider, low, max(high, low + step), step)
         if before is None or before.settings is not settings or before.cloud is not cloud:
             if abs(self.slider.value - settings.length) > 1e-9 * settings.length:
                 self.slider.value = min(max(settings.length, self.slider.min), self.slider.max)
-            self.length.value, self.effort.value, self.prefer.value = (
-                f"{settings.length:g}",
-                settings.effort,
-                settings.prefer,
-            )
+            self.view.show_text(self.length, f"{settings.length:g}")
+            self.effort.value, self.prefer.value = settings.effort, settings.prefer
         if before is None or before.grid is not state.grid or before.is_live != state.is_live:
             self._fill_grid(state)
         for part in (self.features, self.rows, self.brush, self.trade):
@@ -76,7 +75,9 @@ class DesignTab:
     def _fill_grid(self, state: StudioState) -> None:
         grid, unit = state.grid, f" {state.grid.unit}" if state.grid is not None and state.grid.unit else ""
         if grid is None:
-            self.figures.content = ""
+            self.figures.content = "\n\n".join(
+                ["no grid yet", *[NO_WORDS] * 2]
+            )  # nothing below it moves when there is one
             return
         quality, certificate = grid.quality, grid.certificate
         quick = " (quick, not saved)" if state.is_live else ""
@@ -84,7 +85,9 @@ class DesignTab:
             f"{len(grid.nodes):,} nodes, {len(grid.edges):,} members{quick}\n\n"
             f"length {quality.length_mean:.4g}{unit}, CV {quality.length_cv:.4f}, G {quality.shape_mean:.4f}"
         )
-        if certificate is not None:
+        if certificate is None:
+            self.figures.content += f"\n\n{NO_WORDS}"
+        else:
             count = len(certificate.warnings)
             warned = f" with {count} warning{'s' * (count > 1)}: Grid, Certificate" if count else ""
             self.figures.content += (

@@ -12,6 +12,7 @@ from .colours import BRUSHED, DIMMED, colors_of, histogram_of, legend_of, legend
 from .drawn_lines import numbers_of
 from .frame import SectionPlane
 from .pictures import PictureTool
+from .scale import round_ends, set_scale
 from .scene import (
     BALL_RADIUS,
     FAINT,
@@ -58,11 +59,12 @@ class GridTab:
         PictureTool(view, gui)
         for each in (self.members, self.panels, self.nodes, self.tubes, self.axis, self.at):
             each.on_update(step(self.draw))
-        self.range.on_update(step(self._slide))
-        self.between.on_update(view.typed(self._brush))
+        self.range.on_update(view.slid(self._slide))
+        view.typed(self.between, self._brush)
         self.coloring.on_update(step(lambda: self._chosen(view.session.state)))
         for each in (self.axis, self.at):
             each.on_update(step(lambda: view.scan.draw()))
+            each.on_update(step(lambda: view.structure.draw()))
         self.tubes.on_update(step(self._light))
         self.dark.on_update(step(self._theme))
 
@@ -98,14 +100,15 @@ class GridTab:
             _, low, high = colors_of(values, middle)
             self._values = values
             begin, end, step = round_ends(low, high)
-            self.range.min, self.range.max, self.range.step = begin, end, step
-            self.range.value, self.between.value = (begin, end), ""
+            set_scale(self.range, begin, end, step)
+            self.range.value = begin, end
+            self.view.show_text(self.between, "")
             self.legend.content = legend_of(self.coloring.value, column.unit, low, high, middle is not None)
         self.draw()
 
     def _slide(self) -> None:
         low, high = self.range.value
-        self.between.value = f"{low:g}, {high:g}"
+        self.view.show_text(self.between, f"{low:g}, {high:g}")
         self.draw()
 
     def _brush(self) -> None:
@@ -217,10 +220,3 @@ class GridTab:
         )
         if self.tubes.value:
             self._light()
-
-
-def round_ends(low: float, high: float) -> tuple[float, float, float]:
-    """Return round numbers around the ends of a scale, and a round step of about a 200th of it."""
-    step = 10.0 ** np.floor(np.log10((high - low) / 100 or 0.01))
-    begin, end = np.floor(low / step), np.floor(high / step) + 1
-    return float(f"{begin * step:.12g}"), float(f"{end * step:.12g}"), float(f"{step:.12g}")

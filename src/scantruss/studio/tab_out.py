@@ -10,6 +10,7 @@ from ..export.formats import GRID, STRUCTURE, suffixes_of
 from ..runtime.progress import Progress
 from .further_files import FURTHER_FILES, further_files
 from .outputs import project_file, settings_files
+from .presses import Call
 
 if TYPE_CHECKING:
     from .state import StudioState
@@ -44,8 +45,8 @@ class OutTab:
     def _files(self, kind: str) -> dict[str, bytes]:
         return self.view.session.files(kind, self.suffix[kind].value)
 
-    def _download(self, files: Callable[[], dict[str, bytes]]) -> Callable[[Any], None]:
-        return self.view.step(lambda: self._send(files()))
+    def _download(self, files: Callable[[], dict[str, bytes]]) -> Call:
+        return self.view.aside(lambda: self._send(files()))
 
     def _make_further(self) -> None:
         """Make the file in the background, for some take long."""

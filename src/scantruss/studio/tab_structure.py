@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import time
 from typing import TYPE_CHECKING, Any
 
@@ -98,19 +99,23 @@ class StructureTab:
         self.loads, self.supports = gui.add_checkbox("loads", True), gui.add_checkbox("supports", True)
         animate = gui.add_button("Animate")
         run.on_click(view.step(self._run))
-        animate.on_click(view.step(self._animate))
+        animate.on_click(view.aside(self._animate))
         self.case.on_update(view.step(self._choose))
         view.modes[SUPPORT_MODE] = lambda origin, ahead: self.support(view.under(origin, ahead))
         for each in (self.factor, self.loads, self.supports):
-            each.on_update(view.step(lambda: self._draw(view.session.state)))
+            each.on_update(view.step(self.draw))
 
     @property
     def is_moved(self) -> bool:
         """Whether a displaced shape is drawn."""
         return bool(self.case.value != AS_BUILT)
 
-    def _choose(self) -> None:
+    def draw(self) -> None:
+        """Draw supports, loads and the displaced shape, on the drawn side of the section."""
         self._draw(self.view.session.state)
+
+    def _choose(self) -> None:
+        self.draw()
         self.view.look.draw()
 
     def _run(self) -> None:
@@ -203,7 +208,9 @@ class StructureTab:
             return
         model, _ = shown
         places = self.view.places(model)
+        kept = self._kept(places)
         held = model.supported if self.supports.value else np.zeros(0, np.int64)
+        held = held[kept[held]]
         scene.balls("/supports/held", places[held], SUPPORT_COLOR, SUPPORT_RADIUS)
         moved = self._moved(state)
         if moved is None:
@@ -212,11 +219,18 @@ class StructureTab:
             change, factor, is_mode = moved
             size = 1e3 * np.linalg.norm(change, axis=1)[model.members].mean(axis=1)
             colors, low, high = colors_of(size, None)
-            scene.lines("/moved", (places + self._in_scene(change, factor))[model.members], colors, 4.0)
+            drawn = kept[model.members].all(axis=1)
+            ends = (places + self._in_scene(change, factor))[model.members[drawn]]
+            scene.lines("/moved", ends, colors[drawn], 4.0)
             if not is_mode:
                 legend = legend_of(f"displacement, drawn {times_of(factor)} times", "mm", low, high, False)
         self.view.legends.show("shape", legend)
         self._draw_loads(state, places)
+
+    def _kept(self, places: np.ndarray) -> np.ndarray:
+        """Return which nodes at places (V, 3) of the scene the section leaves (V,)."""
+        section = self.view.look.section
+        return np.ones(len(places), bool) if section is None else section.keeps(places)
 
     def _in_scene(self, change: np.ndarray, factor: float) -> np.ndarray:
         return (change * (factor / self.view.metres() * self.view.frame.factor)).astype(np.float32)
@@ -236,7 +250,7 @@ class StructureTab:
             for side in (0, 1):
                 np.add.at(forces, truss.members[:, side], half)
         size = np.linalg.norm(forces, axis=1)
-        strong = np.flatnonzero(size > 0.02 * size.max())
+        strong = np.flatnonzero((size > 0.02 * size.max()) & self._kept(places))
         drawn = strong[spread(places[strong], MOST_ARROWS)]
         along = forces[drawn] * (LOAD_ARROW * DRAWN_EXTENT / (size.max() or 1.0))
         self.view.scene.lines("/loads", barbed(places[drawn], along), LOAD_COLOR, ARROW_WIDTH)
@@ -247,11 +261,18 @@ class StructureTab:
             raise InputError("choose a load case or a mode to animate")
         change, factor, _ = moved
         places, members = self.view.places(shown[0]), shown[0].members
-        handle = self.view.scene.api.get_handle_by_name("/moved")
+        members = members[self._kept(places)[members].all(axis=1)]
+        scene = self.view.scene.api
+        handle = scene.get_handle_by_name("/moved")
         step = self._in_scene(change, factor)
+        if handle is None:
+            raise InputError("nothing that moves is on the drawn side of the section")
         began = time.monotonic()
-        while (spent := time.monotonic() - began) < ANIMATION_SECONDS and self.view.session.state is state:
+        while (spent := time.monotonic() - began) < ANIMATION_SECONDS:
+            if scene.get_handle_by_name("/moved") is not handle:  # another shape is drawn meanwhile
+                return
             swing = np.float32(np.sin(2 * np.pi * SWINGS * spent / ANIMATION_SECONDS))
-            handle.points = (places + swing * step)[members]
+            with contextlib.suppress(RuntimeError):  # of one that has just been removed
+                handle.points = (places + swing * step)[members]
             time.sleep(FRAME_SECONDS)
         self._draw(state)

@@ -38,7 +38,7 @@ class TradeTool:
         self._drawn: tuple[Any, ...] = ()
         self.parts.on_update(view.step(self._choose))
         find.on_click(view.step(self._find))
-        self.number.on_update(view.typed(self._take))
+        view.typed(self.number, self._take)
 
     def _choose(self) -> None:
         self.mirrored.visible = self.parts.value != LENGTHS
@@ -63,18 +63,18 @@ class TradeTool:
     def fill(self, _before: StudioState | None, state: StudioState) -> None:
         """Show the trade of the grid of a state."""
         trade = state.trade
+        present = None if trade is None else present_number(state)
+        self.view.show_text(self.number, "" if present is None else str(present))  # so that another press counts
         if self._drawn == (trade, state.grid):
             return
         if trade is not None and trade not in self._drawn:
             self.parts.value = trade.parts  # as of a project that was opened
             self._choose()
         self._drawn = (trade, state.grid)
-        self.curve.content = "" if trade is None else curve_of(trade, present_number(state))
+        self.curve.content = "" if trade is None else curve_of(trade, present)
         self.number.visible = trade is not None
         self.about.content = "" if trade is None else words_of_present(trade, state)
         self.about.visible = bool(self.about.content)
-        present = None if trade is None else present_number(state)
-        self.number.value = "" if present is None else str(present)
 
 
 def present_number(state: StudioState) -> int | None:

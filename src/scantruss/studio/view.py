@@ -3,25 +3,23 @@
 from __future__ import annotations
 
 import contextlib
-import sys
 from collections.abc import Callable
-from threading import RLock, Timer
+from threading import RLock
 from typing import Any
 
 import numpy as np
 
-from ..errors import ScanTrussError
 from ..export.formats import GRID, STRUCTURE
 from ..export.model import Model
 from ..export.page_tables import Tables, tables_of
 from ..structure.build import scale_of
 from .colours import colorings_of_scan
 from .frame import BESIDE_FIRST, DRAWN_EXTENT, ROOM_AROUND, SceneFrame, distance_to_see
-from .in_order import InOrder
+from .head import Head
 from .legends import Legends
 from .outputs import model_to_show
 from .picking import NEAR_ENOUGH, pick
-from .scan_steps import LARGEST_UPLOAD, TOO_LARGE
+from .presses import Presses
 from .scene import FIRST_POINTS, Scene
 from .session import Session
 from .state import StudioState
@@ -33,7 +31,6 @@ from .tab_grid import GridTab
 from .tab_out import OutTab
 from .tab_scan import ScanTab
 from .tab_structure import StructureTab
-from .worker import words_of
 
 Click = Callable[[np.ndarray, np.ndarray], None]
 """What a click does, with the origin (3,) and the direction (3,) of its ray in the scene."""
@@ -44,28 +41,26 @@ PLAN_FAR = 1.3  #: of the camera above a plan, so that all of it is seen [distan
 PANEL_WIDTH, USUAL_WIDTH = 452, 1280  #: of the panel; of a page that has not said its own [pixel]
 LEAST_DRAWING = 0.4  #: of a page that the drawing has beside the panel, which lies over it on narrower ones
 FIRST_SEEN_FROM = np.array([0.8, -1.4, 0.9])  #: direction from which the scan is seen first
-STEP_NAMES = ("Stop", "Undo", "Redo")
+STEP_NAMES = ("Stop", "Undo", "Redo", "See all")
 SMALL_PICTURE, PICTURE_WAIT = (
     (8, 8),
     2.0,
 )  #: size of a picture that is asked for first [pixel], and how long it may take [s]
 REFUSAL_SECONDS = 10.0  #: for which a refusal stands on the drawing too [s]
-TYPING_PAUSE = 0.6  #: after which what was typed counts [s]
 
 
-class StudioView:
+class StudioView(Presses):
     """Binds a session to the scene and the controls of one page."""
 
     def __init__(self, session: Session, client: Any) -> None:
-        self.session, self.client = session, client
+        super().__init__(session)
+        self.client = client
         self.scene = Scene(client.scene)
         whole = float(client.camera.image_width or USUAL_WIDTH)
         self._width = max(
             whole - PANEL_WIDTH, LEAST_DRAWING * whole
         )  # of the drawing once the panel is beside it [pixel]
-        self._lock, self.in_order = RLock(), InOrder()
-        self._typed: dict[Callable[[], None], Timer] = {}  # steps of what was typed, which wait for more
-        self._typing = RLock()
+        self._lock = RLock()
         self._shown: StudioState | None = None
         self._refused = session.message
         self._model: tuple[StudioState, Model, Tables] | None = None
@@ -81,12 +76,12 @@ class StudioView:
             gui.main_panel.set_width(PANEL_WIDTH)
             gui.configure_theme(show_share_button=False, show_logo=False, control_width="large")
             gui.add_html(PANEL_STYLE)
-            self.message = gui.add_markdown("")
-            gui.add_html(words_of_large_upload())
-            self.progress = gui.add_progress_bar(0.0, visible=False)
+            self.head = Head(gui)
             generate = gui.add_button("Generate", color="blue", hint="with the effort that Design says (Ctrl+Enter)")
             self.steps = gui.add_button_group(
-                "steps", STEP_NAMES, hint="what undo (Ctrl+Z) and redo (Ctrl+Y) would take is said above"
+                "steps",
+                STEP_NAMES,
+                hint="what undo (Ctrl+Z) and redo (Ctrl+Y) would take is said above; See all moves the camera back",
             )
             self.click = gui.add_dropdown("a click", (SELECT,), hint="what a click on the drawing does")
             self.row = gui.add_markdown("", visible=False)
@@ -108,7 +103,7 @@ class StudioView:
                 self.files = OutTab(self, gui)
             self.click.options = self.clicks
             generate.on_click(self.step(session.generate))  # before anybody can click
-            self.steps.on_click(self.step(lambda: self._step(self.steps.value)))
+            self.steps.on_click(self.chosen(self._step))
             self._add_keys(gui)
         self.tabs = (self.design, self.constraints, self.structure, self.look, self.scan, self.compare, self.files)
         client.scene.on_click()(self.in_order(self._clicked))
@@ -123,63 +118,9 @@ class StudioView:
     def close(self) -> None:
         """Stop listening to the session."""
         self._end()
-        self.in_order.close()
+        super().close()
 
     # ---- controls
-
-    def step(self, step: Callable[[], None]) -> Callable[[Any], None]:
-        """Return what a control calls, after what was just typed; what is refused is shown, and what the server sets calls nothing."""
-
-        def call(event: Any) -> None:
-            if getattr(event, "client", self.client) is not None and self._take_typed():
-                self.do(step)
-
-        return call
-
-    def do(self, step: Callable[[], None]) -> bool:
-        """Take a step; what is refused is said on the page. Return whether it was taken."""
-        refused = False
-        try:
-            step()
-        except Exception as error:  # the page goes on
-            if not isinstance(error, ScanTrussError):
-                sys.excepthook(*sys.exc_info())
-            self.session.message, refused = words_of(error), True
-        else:
-            self.session.message = "" if not self.session.stage else self.session.message
-        self.update()
-        return not refused
-
-    def typed(self, step: Callable[[], None]) -> Callable[[Any], None]:
-        """Return what a text field calls: the step is taken when no more is typed."""
-
-        def call(event: Any) -> None:
-            if getattr(event, "client", self.client) is None:
-                return
-            with self._typing:
-                if (timer := self._typed.pop(step, None)) is not None:
-                    timer.cancel()
-                timer = self._typed[step] = Timer(TYPING_PAUSE, self._take_typed, (step,))
-                timer.daemon = True
-                timer.start()
-
-        return call
-
-    def _take_typed(self, *steps: Callable[[], None]) -> bool:
-        """Take steps of what was typed, all that wait where none are named; whether none was refused."""
-        with self._typing:
-            taken = [step for step in steps or tuple(self._typed) if step in self._typed]
-            for step in taken:
-                self._typed.pop(step).cancel()
-        return all([self.do(step) for step in taken])
-
-    def do_quietly(self, step: Callable[[], None]) -> None:
-        """Take a step of which there are many a second; what is refused is said on the page."""
-        try:
-            step()
-        except Exception as error:  # the page goes on
-            self.session.message = words_of(error)
-            self.update()
 
     def say(self, words: str) -> None:
         """Say something in passing."""
@@ -187,7 +128,7 @@ class StudioView:
 
     def _step(self, name: str) -> None:
         session = self.session
-        dict(zip(STEP_NAMES, (session.stop, session.undo, session.redo), strict=True))[name]()
+        dict(zip(STEP_NAMES, (session.stop, session.undo, session.redo, self.see_all), strict=True))[name]()
 
     def _add_keys(self, gui: Any) -> None:
         """Let keys take steps too."""
@@ -250,7 +191,7 @@ class StudioView:
             (each.name, each.values[number], each.unit) for each in tables[kind] if each.values[number] is not None
         ]
         words = " · ".join(
-            f"{name} **{value:.6g}** {unit}" if isinstance(value, float) else f"{name} **{value}**"
+            f"{name} **{value:.15g}** {unit}" if isinstance(value, float) else f"{name} **{value}**"
             for name, value, unit in cells
         )
         self.row.content = words
@@ -272,7 +213,7 @@ class StudioView:
         kept = self._model
         if kept is None or kept[0].grid is not state.grid or kept[0].solution is not state.solution:
             model = model_to_show(state, STRUCTURE if state.solution is not None else GRID)
-            kept = self._model = (state, model, tables_of(model))
+            kept = self._model = (state, model, tables_of(model, state.grid))
         return kept[1], kept[2]
 
     def metres(self) -> float:
@@ -312,6 +253,11 @@ class StudioView:
         aside = np.array([BESIDE_FIRST * DRAWN_EXTENT * (designs - 1), 0.0, 0.0])
         self.see(np.concatenate([corners, corners + aside]))
 
+    def see_all(self) -> None:
+        """Move the camera back to where all that is drawn is seen."""
+        if self.session.cloud is not None:
+            self.overview(self.compare.beside)
+
     def see(self, places: np.ndarray) -> None:
         """Move the camera so that places of the scene (N, 3) are seen."""
         middle = (places.min(axis=0) + places.max(axis=0)) / 2
@@ -325,30 +271,15 @@ class StudioView:
         session = self.session
         with self._lock, self.client.atomic():
             state = session.state
-            words = f"**Refused:** {session.message}" if session.message else session.stage or "ready"
-            if state.is_stale and not session.message and not session.stage:
-                words = "The grid was made before the last change: press **Generate**"
-            elif state.is_structure_stale and not session.message and not session.stage:
-                words = "The structure was solved before the last change: press **Run**"
-            undo, redo = session.history.words
-            taken = " · ".join(f"{way}: {what}" for way, what in (("undo", undo), ("redo", redo)) if what)
-            self.message.content = words + (f"\n\n<small>{taken}</small>" if taken else "")
+            self.head.show(session)
             if session.message and session.message != self._refused:  # the panel may have been scrolled
                 self.client.add_notification(
                     "Refused", session.message, color="red", auto_close_seconds=REFUSAL_SECONDS
                 )
             self._refused = session.message
-            self.progress.visible, self.progress.value = bool(session.stage), 100.0 * session.share
             self.scene.front(None if state.cloud is None or session.front is None else self.frame, session.front)
             before, self._shown = self._shown, state
             for tab in self.tabs:
                 tab.fill(before, state)
             if state.cloud is not None and (before is None or before.cloud is not state.cloud):
                 self.overview()
-
-
-def words_of_large_upload() -> str:
-    """Return what the page says of a file that is larger than it sends; hidden until one is chosen (`page_script.js`)."""
-    return (
-        f'<p hidden role="alert" data-largest="{LARGEST_UPLOAD}" style="padding:0 .6em"><b>Refused:</b> {TOO_LARGE}</p>'
-    )

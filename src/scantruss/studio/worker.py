@@ -50,13 +50,14 @@ class Worker:
         Parameters
         ----------
         quick : bool
-            It is not taken while a task that is not quick waits or runs. One that runs comes to its end: of many that are asked for one
-            after the other, some are seen.
+            It is not taken while a task that is not quick waits, or runs and has not been stopped. One that runs comes to its end: of many
+            that are asked for one after the other, some are seen.
         then : bool
             It goes on with what waits and runs, which comes to its end first; where that is refused it is forgotten.
         """
         with self._change:
-            if quick and not all(one is None or one.quick for one in (self._running, *self._waiting)):
+            running = None if self._stop else self._running
+            if quick and not all(one is None or one.quick for one in (running, *self._waiting)):
                 return False
             self._waiting = [*(self._waiting if then else ()), _Asked(task, quick, then)]
             self._stop = self._stop or not (then or quick)

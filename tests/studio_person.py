@@ -1,0 +1,88 @@
+"""What a person does on the page of the studio, for tests that drive a browser: tabs, fields, lists, presses."""
+
+from __future__ import annotations
+
+import socket
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from scantruss.studio.browsers import Browsers
+from scantruss.studio.server import serve_browsers, start_server
+from scantruss.studio.session import Session
+
+
+def free_port() -> int:
+    """Return a port that nobody uses."""
+    with socket.socket() as trial:
+        trial.bind(("127.0.0.1", 0))
+        return int(trial.getsockname()[1])
+
+
+@contextmanager
+def served_session(session: Session) -> Iterator[tuple[str, Any]]:
+    """Serve a session; give the address of its page and the server."""
+    server, _ = start_server("127.0.0.1", free_port())
+    try:
+        serve_browsers(server, Browsers(session))
+        yield f"http://127.0.0.1:{server.get_port()}/", server
+    finally:
+        session.stop()
+        server.stop()
+
+
+def write_dome(folder: Path, rows: int = 60) -> Path:
+    """Write the scan of a shallow dome, 10 by 10 and 2 high, with so many rows of as many points."""
+    x, y = (each.ravel() for each in np.meshgrid(np.linspace(0, 10, rows), np.linspace(0, 10, rows)))
+    np.savetxt(folder / "dome.xyz", np.stack([x, y, 2 - 0.04 * ((x - 5) ** 2 + (y - 5) ** 2)], axis=1))
+    return folder / "dome.xyz"
+
+
+@contextmanager
+def served_dome(folder: Path) -> Iterator[tuple[str, Session, Any]]:
+    """Serve a studio with a shallow dome in metres; give its address, its session and the server."""
+    pytest.importorskip("viser", reason="viser is not installed")
+    session = Session(folder / "dome.scantruss")
+    session.open(write_dome(folder))
+    session.set_unit("m")
+    with served_session(session) as (address, server):
+        yield address, session, server
+
+
+def until(holds: Callable[[], bool], seconds: float = 30.0) -> bool:
+    """Wait until something holds; whether it does."""
+    end = time.monotonic() + seconds
+    while not holds() and time.monotonic() < end:  # ends: time passes
+        time.sleep(0.05)
+    return holds()
+
+
+def tab(page: Any, name: str) -> None:
+    """Go to a step."""
+    page.click(f"[role=tab]:has-text('{name}')")
+    page.wait_for_timeout(200)
+
+
+def field(page: Any, name: str) -> Any:
+    """Return the text field, box or list with a label."""
+    return page.locator(f"xpath=//label[normalize-space(.)='{name}']/following::input[1]").first
+
+
+def choose(page: Any, old: str, new: str) -> None:
+    """Choose something else in a drop-down list, as a person does."""
+    page.locator(f"input[value='{old}']:visible").first.click()
+    page.get_by_role("option", name=new, exact=True).first.click()
+
+
+def drag(page: Any, begin: tuple[float, float], end: tuple[float, float]) -> None:
+    """Drag from one place of the page to another."""
+    page.mouse.move(*begin)
+    page.mouse.down()
+    page.mouse.move(*end, steps=8)
+    page.wait_for_timeout(400)
+    page.mouse.up()
