@@ -91,7 +91,7 @@ def advance_fronts(
     *,
     progress: Progress | None = None,
 ) -> list[Grid]:
-    """Return what the fronts leave behind that advance over a scan, one for each field (Fig. 4); see `front.advance.advance_front`.
+    """Return what the fronts leave behind that advance over a scan, one for each field; one front is `front.advance.advance_front`.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The whole method: scan -> boundary -> front -> grid (Figs. 1 and 4)."""
+"""The whole method: scan -> boundary -> front -> grid (Fig. 1)."""
 
 from __future__ import annotations
 
@@ -262,7 +262,7 @@ def make_grid_with_most_ridges(
 
 
 def make_grid(cloud: PointCloud, attempt: Attempt, *, progress: Progress | None = None) -> Grid:
-    """Return the grid of one attempt, with its certificate: the method, one line a step (Figs. 1 and 4).
+    """Return the grid of one attempt, with its certificate: the method, one line a step (Fig. 1).
 
     Raises
     ------

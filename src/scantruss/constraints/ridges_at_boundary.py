@@ -14,9 +14,8 @@ if TYPE_CHECKING:
     from .ridge_ends import Ridge
 
 BOUNDARY_REACH = 0.9  # a ridge that ends so near to the boundary comes to it [member lengths]
-RADIUS_OF_TUBE = (
-    0.12  # radius around the continuation of a ridge within which points tell where the scan ends [member lengths]
-)
+# radius around the continuation of a ridge within which points tell where the scan ends [member lengths]
+RADIUS_OF_TUBE = 0.12
 PLACES_OF_DIRECTION = 3  # places from which the direction at the end of a ridge is taken
 # places at the end of a ridge from which its direction is told, and the last of them that are left out
 STEADY_PLACES_OF_DIRECTION, PLACES_LEFT_OUT = 9, 3

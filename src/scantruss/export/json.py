@@ -29,7 +29,7 @@ from ..settings import UNITS, Settings
 from .model import Model, model_of_grid, model_of_truss
 
 FORMAT = "scantruss-grid"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 1  # of the files of grids; later ones are refused
 
 
 def encode_model(model: Model) -> bytes:

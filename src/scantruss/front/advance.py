@@ -1,4 +1,4 @@
-"""The advancing front: drives the kernel, slice by slice (Sec. 3.5, Fig. 4)."""
+"""The advancing front (Sec. 3.5): `advance_front` is Fig. 4; it drives the kernel, slice by slice."""
 
 from __future__ import annotations
 
@@ -44,12 +44,8 @@ from ..settings import Settings
 from ..surface.samples import SurfaceSamples, local_field
 from .orientation_field import nodes_at
 
-STRICTNESS_OF_ROUNDS = (
-    1.0,
-    0.6,
-    0.3,
-    0.0,
-)  # strictness of each round: what found no room waits for the next, more tolerant one
+# strictness of each round: a segment that found no room waits for the next, more tolerant one
+STRICTNESS_OF_ROUNDS = (1.0, 0.6, 0.3, 0.0)
 LARGEST_GAP = 60  # most segments of a gap that is filled; larger gaps stay open
 FRONT_CLEARANCE = 0.6  # least distance of a candidate node from the initial front [member lengths]
 FIXED_CLEARANCE = 0.33  # least distance of a fixed position from the initial front [member lengths]
@@ -71,7 +67,7 @@ def advance_front(
     *,
     progress: Progress | None = None,
 ) -> Grid:
-    """Return the grid that a front leaves behind when it advances over a scan (Fig. 4).
+    """Return the grid that a front leaves behind when it advances over a scan: Fig. 4, one line a step.
 
     Parameters
     ----------
@@ -86,9 +82,21 @@ def advance_front(
     progress : callable, optional
         Called with ("front", share); may raise to stop.
     """
-    front = start_front(new_front(samples, settings), samples, boundary, constraints, settings, candidates)
+    front = start_front(new_front(samples, settings), samples, boundary, constraints, settings, candidates)  # Sec. 3.3
     members = line_members(front) if constraints.lines.curves else np.zeros((0, 2), np.int64)
-    rules = lists.Rules(
+    rules = rules_of(samples, settings)
+    for strict in STRICTNESS_OF_ROUNDS:  # Sec. 3.5: all active segments are advanced, then those that found no room
+        activate_waiting(front)
+        by_cases = settings.method == "paper" and strict == STRICTNESS_OF_ROUNDS[0]  # Table 1, else by quality
+        advance = kernels.advance_by_cases if by_cases else kernels.advance
+        front = run(front, samples, rules._replace(strict=strict), progress, advance)
+    close_gaps(front, samples, settings)
+    return grid_of_front(front, members, samples, settings)
+
+
+def rules_of(samples: SurfaceSamples, settings: Settings) -> lists.Rules:
+    """Return what the settings ask of a front, at strictness 1."""
+    return lists.Rules(
         length=settings.length,
         desired=settings.length,
         graded=samples.graded,
@@ -101,19 +109,17 @@ def advance_front(
         quadrangle=settings.case3 == "quadrangle",
         strict=1.0,
     )
-    for strict in STRICTNESS_OF_ROUNDS:
-        count = int(front.count[lists.SEGMENTS])
-        for s in np.flatnonzero(front.state[:count] == lists.WAITING).tolist():
-            lists.enqueue(front, s)
-        by_cases = settings.method == "paper" and strict == STRICTNESS_OF_ROUNDS[0]
-        front = run(
-            front,
-            samples,
-            rules._replace(strict=strict),
-            progress,
-            kernels.advance_by_cases if by_cases else kernels.advance,
-        )
-    close_gaps(front, samples, settings)
+
+
+def activate_waiting(front: lists.Front) -> None:
+    """Make the waiting segments of a front active again, in their order."""
+    count = int(front.count[lists.SEGMENTS])
+    for s in np.flatnonzero(front.state[:count] == lists.WAITING).tolist():
+        lists.enqueue(front, s)
+
+
+def grid_of_front(front: lists.Front, members: np.ndarray, samples: SurfaceSamples, settings: Settings) -> Grid:
+    """Return the triangles of a front as a grid; `members`: (M, 2) those of its lines, all of which must be there."""
     triangles = front.triangles[: front.count[lists.TRIANGLES]]
     check_kept(members, triangles, front.nodes + samples.origin)
     used, numbered = np.unique(triangles, return_inverse=True)

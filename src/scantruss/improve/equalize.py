@@ -152,6 +152,11 @@ def terms_of(mesh: WorkingMesh, scratch: Scratch) -> Terms:
     return Terms(mean / mesh.length - 1.0, min(energy / max(count, 1), LARGEST_SHARE), max(count, 1))
 
 
+def energy_of_grid(mesh: WorkingMesh, scratch: Scratch) -> float:
+    """Return the energy of an opened grid with the usual weight of the lengths."""
+    return float(total_energy(mesh.net, mesh.patches, scratch, mesh.length, LENGTH_WEIGHT)[0])
+
+
 def energy_of_node(mesh: WorkingMesh) -> float:
     """Return the energy of an opened grid per node, which compares grids with different numbers of nodes."""
     energy, mean, count = total_energy(mesh.net, mesh.patches, new_scratch(mesh), mesh.length, LENGTH_WEIGHT)

@@ -26,9 +26,8 @@ NO_DATA_SHARES, FEWEST_NO_DATA = (0.002, 0.5), 20  # share and number of points 
 CLIFF_GAP = 0.1  # gap to the other heights, as a share of their range, that no terrain has
 STEEP_CLIFF = 10.0  # slope to the nearest others, in multiples of the usual one, that no shore has
 SOME_OF_RASTER = 20_000  # points of the rest that are looked at
-FAR_FROM_MIDDLE = (
-    10.0  # widths of the middle half of a scan from its middle, beyond which a place that many points share has no data
-)
+# widths of the middle half of a scan from its middle, beyond which a place that many points share has no data
+FAR_FROM_MIDDLE = 10.0
 SINGLE_STEP = 0.25  # step of coordinates in single precision from which a note says it [mean distances between points]
 MOST_INVALID_SHARE = 0.01  # share of the points that may be invalid; more are a fault of the file
 EXTENTS_READ = (1e-30, 1e30)  # of a scan in any unit; numbers with swapped bytes lie outside

@@ -21,8 +21,8 @@ from ..structure.substructures import factor_by_parts
 from ..structure.truss import LoadCase, Truss
 
 SHIFT = 1e-13  # of the scaled stiffness, so that a pivot that is nil does not end the elimination
-MOST_TIMES = 2.0  # moves of a step that stands, over those of the whole, ...
-MOST_MOVE = (0.01, 0.1)  # ... but neither less nor more than this over the median length of members
+MOST_TIMES = 2.0  # most that a step that stands moves, over the moves of the whole
+MOST_MOVE = (0.01, 0.1)  # least and greatest value of that limit, over the median length of members
 PROPS_APART = 3.0  # members between props that are set at once
 NONE = np.zeros(0, np.int64)  # no nodes
 LOOSE = 1e-9  # a smaller pivot of the scaled stiffness is one of a motion without resistance

@@ -14,7 +14,7 @@ from ..errors import InputError
 from ..selection import FORMS, RETURNS
 
 SAMPLE_SPACING = 0.2  # spacing of the surface samples of a scan [member lengths]
-SMOOTH_SAMPLE_SPACING = 0.3  # the same for a dense, smooth scan [member lengths]
+SMOOTH_SAMPLE_SPACING = 0.3  # spacing of the surface samples of a dense, smooth scan [member lengths]
 HOLE = 4.0  # boundary length of the smallest hole worth keeping; the front runs over smaller ones [member lengths]
 CELLS = ("triangle", "quad", "hexagon")
 ROW_GUIDES = ("boundary", "curvature")

@@ -6,10 +6,8 @@ import numpy as np
 
 from .truss import Truss
 
-ONE_WAY, SIDEWAYS = (
-    0.6,
-    2.0,
-)  #: share of the surface that faces one way on the mean; ratio of its parts along x or y and along z: it may lie on its side
+#: share of the surface that faces one way on the mean; ratio of its parts along x or y and along z: it may lie on its side
+ONE_WAY, SIDEWAYS = 0.6, 2.0
 MANY_HELD = 0.8  #: share of the nodes of a structure from which supports are odd
 
 

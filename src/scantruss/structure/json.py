@@ -25,7 +25,7 @@ from .statics import Solution
 from .truss import Combination, LoadCase, Truss
 
 STRUCTURE_FORMAT = "scantruss-structure"
-STRUCTURE_VERSION = 1
+STRUCTURE_VERSION = 1  # of the files of structures; others are refused
 ROW_A_LINE = (",\n", ": ")  #: separators of JSON that put each value of a plain list on a line of its own
 UNITS_WRITTEN = {"length": "m", "force": "N", "mass": "kg"}
 _ARRAYS = {  # of the record: columns and type

@@ -12,7 +12,7 @@ from .catalogue import Section, bundled_sections
 from .checks import MemberChecks, section_class, strengths, utilizations
 from .groups import WAYS_TO_GROUP, member_groups_of
 from .modes import worst_buckling
-from .statics import CaseResult, Solution, factor_stiffness, solve
+from .statics import CaseResult, factor_stiffness, solve
 from .truss import Truss
 
 ROUNDS = 60  #: of solving and choosing
@@ -134,7 +134,7 @@ def _sized(truss: Truss, count: int, checks: MemberChecks, rounds: list[SizingRo
         truss = truss.replace(sections=tuple(chain), section_of=chosen)
         factored = factor_stiffness(truss)
         solution = solve(truss, factored)
-        judged = _judged(solution)
+        judged = solution.judged_results()
         needed = _same_in_groups(_needed(truss, judged, chosen, checks), group_of)
         least = None
         if (needed <= chosen).all():
@@ -181,11 +181,6 @@ def weight_curve(
             mass = _sized(truss, number, checks or MemberChecks(), [], by).mass
             curve[number] = min([mass, *curve.values()])
     return curve | {count: sized.mass}
-
-
-def _judged(solution: Solution) -> list[CaseResult]:
-    """Return the results of the ULS combinations, or of all load cases where there are none."""
-    return [result for result in solution.all_results() if result.state == "ULS"] or list(solution.cases)
 
 
 def _needed(truss: Truss, judged: list[CaseResult], chosen: np.ndarray, checks: MemberChecks) -> np.ndarray:

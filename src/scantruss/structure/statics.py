@@ -14,6 +14,7 @@ from .frame import (
     BEND_Y1,
     BEND_Z1,
     LENGTHEN,
+    TWIST,
     fixed_end_forces,
     freedoms,
     member_freedoms,
@@ -32,6 +33,9 @@ STIFF = 1e-8  #: smallest eigenvalue that is no mechanism, whatever it is exactl
 REFINED = 1e-11  #: share of the greatest load that a solution may leave
 UNSOLVED = 1e-3  #: share of a load that a factor leaves where it is none
 STATIONS = 9  #: places along a member, both ends included, at which forces are given
+AXIAL_FORCE, SHEAR_Y, SHEAR_Z, TORSION, MOMENT_Y, MOMENT_Z = range(
+    6
+)  #: columns of the forces in a member: N, Vy, Vz, T, My, Mz
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,12 +95,12 @@ class CaseResult:
         start, end = self.natural[:, None, [BEND_Y1, BEND_Z1]], self.natural[:, None, [BEND_Y1 + 1, BEND_Z1 + 1]]
         made = np.empty((len(self.natural), STATIONS, 6))
         slope, sag = length * (1 - 2 * share) / 2, length**2 * share * (1 - share) / 2
-        made[:, :, 0] = self.natural[:, LENGTHEN, None] + line[:, :, 0] * slope
-        made[:, :, 1] = -(start + end)[:, :, 1] / length + line[:, :, 1] * slope
-        made[:, :, 2] = (start + end)[:, :, 0] / length + line[:, :, 2] * slope
-        made[:, :, 3] = self.natural[:, 1, None]
-        made[:, :, 4] = -start[:, :, 0] * (1 - share) + end[:, :, 0] * share + line[:, :, 2] * sag
-        made[:, :, 5] = -start[:, :, 1] * (1 - share) + end[:, :, 1] * share - line[:, :, 1] * sag
+        made[:, :, AXIAL_FORCE] = self.natural[:, LENGTHEN, None] + line[:, :, 0] * slope
+        made[:, :, SHEAR_Y] = -(start + end)[:, :, 1] / length + line[:, :, 1] * slope
+        made[:, :, SHEAR_Z] = (start + end)[:, :, 0] / length + line[:, :, 2] * slope
+        made[:, :, TORSION] = self.natural[:, TWIST, None]
+        made[:, :, MOMENT_Y] = -start[:, :, 0] * (1 - share) + end[:, :, 0] * share + line[:, :, 2] * sag
+        made[:, :, MOMENT_Z] = -start[:, :, 1] * (1 - share) + end[:, :, 1] * share - line[:, :, 1] * sag
         return made
 
     @cached_property
@@ -104,8 +108,11 @@ class CaseResult:
         """(M, 6) sizes of the greatest Vy, Vz, T, My, Mz along each member, the extremes within it included; first that of N [N, Nm]."""
         made = np.abs(self.along).max(axis=1)
         length = self.truss.lengths
-        for column, shear, load in ((4, 2, self.line[:, 2]), (5, 1, -self.line[:, 1])):  # where the shear is nil
-            first = self.along[:, 0, shear] if shear == 2 else -self.along[:, 0, shear]
+        for column, shear, load in (
+            (MOMENT_Y, SHEAR_Z, self.line[:, 2]),
+            (MOMENT_Z, SHEAR_Y, -self.line[:, 1]),
+        ):  # where the shear is nil
+            first = self.along[:, 0, shear] if shear == SHEAR_Z else -self.along[:, 0, shear]
             place = np.divide(
                 first, load, out=np.zeros_like(first), where=np.abs(load) * length > 1e-12 * np.abs(first)
             )
@@ -127,9 +134,9 @@ class CaseResult:
         of = self.truss.of_section
         low, high = self.axial.T
         axial = np.where(-low > high, low, high) / of("area")
-        bending = self.greatest[:, 4] / of("elastic_y") + self.greatest[:, 5] / of("elastic_z")
+        bending = self.greatest[:, MOMENT_Y] / of("elastic_y") + self.greatest[:, MOMENT_Z] / of("elastic_z")
         if (round_ := np.array([s.shape == "CHS" for s in self.truss.sections])[self.truss.section_of]).any():
-            both = np.hypot(self.greatest[:, 4], self.greatest[:, 5]) / of("elastic_y")
+            both = np.hypot(self.greatest[:, MOMENT_Y], self.greatest[:, MOMENT_Z]) / of("elastic_y")
             bending = np.where(round_, both, bending)
         return np.stack([axial, bending], axis=1)
 
@@ -165,6 +172,10 @@ class Solution:
         yield from self.cases
         for combination in self.truss.combinations:
             yield self._combined(combination.name, combination.state, combination.factors)
+
+    def judged_results(self) -> list[CaseResult]:
+        """Return the results of the ULS combinations, or of all load cases where there are none."""
+        return [each for each in self.all_results() if each.state == "ULS"] or list(self.cases)
 
     def _combined(self, name: str, state: str, factors: tuple[tuple[str, float], ...]) -> CaseResult:
         by_name = {case.name: case for case in self.cases}

@@ -19,9 +19,8 @@ if TYPE_CHECKING:
     from .truss import Truss
 
 SUPPORT_TURN = 45.0  #: least turn of the boundary, seen over two members to either side, at a corner [degree]
-SHARP_TURN = (
-    40.0  #: least turn at one node, seen over one member and over two, that makes it a corner beside others [degree]
-)
+#: least turn at one node, seen over one member and over two, that makes it a corner beside others [degree]
+SHARP_TURN = 40.0
 SUPPORT_WAYS = "corners, boundary, lowest:H, fixed, ends, line:NAME, loop:N"
 OTHER_WAYS = f"name others with --supports: {SUPPORT_WAYS}, a node such as N001 or a file of positions"
 SUPPORT_WORDS = ("corners", "boundary", "fixed", "ends")  #: of these, those without a value

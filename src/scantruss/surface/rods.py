@@ -9,7 +9,7 @@ from ..kernels.surface.rods import spreads_around
 from .linked_samples import Linked
 
 COARSE_REACH = 1.0  # radius of the neighbourhood that shows whether a sample is of a rod [member lengths]
-FINE_REACH = 0.6  # the same once rods are found, for the joints of scaffold [member lengths]
+FINE_REACH = 0.6  # radius of that neighbourhood once rods are found, for the joints of scaffold [member lengths]
 SAMPLES_OF_SHEET = 6  # fewest samples in a neighbourhood, rods excluded, that make a sheet
 THIN_VARIANCE = 0.15  # largest variance across a rod, in that along it; half a disc, as at a boundary, has 0.28
 END_REACH = 1.3  # distance from a rod up to which samples may be its ends [member lengths]

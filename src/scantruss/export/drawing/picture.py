@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 
 PICTURE_SIZE = (1600, 1200)  #: of a picture [pixel]
 PANELS_SIZE = (2400, 800)  #: of three panels, or of several views [pixel]
-UP = np.array([0.0, 0.0, 1.0])
+UP = np.array([0.0, 0.0, 1.0])  # against gravity
 
 
 def encode_picture(

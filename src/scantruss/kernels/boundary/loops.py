@@ -16,8 +16,8 @@ from ..geometry.boxes import SearchBoxes, search
 from ..geometry.vectors import Vector, across, along, cross, dot, norm, row, subtract, unit
 from ..surface.local_surface import Surface, flood, walk
 
-DISC_DIRECTIONS = 64
-SWEEP_BINS = 240
+DISC_DIRECTIONS = 64  # directions around a point that points near it cover or leave free
+SWEEP_BINS = 240  # directions around a point into which the turn of the rolling disc is divided
 SHEET_SINE = 0.4  # sine of the angle above the mean plane of two places, beyond which they lie on two sheets
 ONE_SHEET_COSINE = -0.5  # cosine between the normals of two places, above which they may lie on one sheet
 SAME_SHEET_COSINE = 0.2  # samples whose normals have a smaller cosine are another sheet, or a plant

@@ -18,7 +18,7 @@ RASTER_HEAD = re.compile(
     r"\s*(ncols|nrows|xll(?:corner|center)|yll(?:corner|center)|cellsize|dx|dy|nodata_value)[ \t]+(\S+)[ \t]*\r?\n?",
     re.IGNORECASE,
 )
-MOST_CELLS = 1 << 31
+MOST_CELLS = 1 << 31  # cells above which a raster is refused
 
 
 def read_asc(path: Path, wanted: Sequence[str] = ()) -> Content:

@@ -26,9 +26,8 @@ SURE_SIDE = 0.6  # certainty that normals face outwards above which the other si
 LEAST_OVERLAP = 0.03  # overlap below which a pair is not considered
 LEAST_AGREEMENT = 0.6  # agreement below which a pair is not considered
 NOISES_WITHIN = 3.0  # distance within which two scans agree, in the noise of both together
-LEAST_AGREEING_DISTANCE = (
-    0.15  # least distance within which two scans agree, in spacings of the view; scanners distort slightly
-)
+# least distance within which two scans agree, in spacings of the view; scanners distort slightly
+LEAST_AGREEING_DISTANCE = 0.15
 LARGEST_AGREEING_DISTANCE = 0.5  # largest distance within which two scans agree, in spacings of the view
 RESIDUALS_WITHIN = 3.0  # distance within which two scans agree, in residuals of pairs taken as right
 LEAST_DISTANCE_SHARE = 0.35  # least share of their usual distance to which the residuals reduce it
