@@ -40,7 +40,7 @@ def completion_parser() -> Parser:
     parser = Parser(
         "completion",
         "|".join(SHELLS),
-        "Print a script with which a shell completes commands and options.\n"
+        "Print a script that lets your shell complete commands and options.\n"
         'bash: eval "$(scantruss completion bash)" in ~/.bashrc; zsh: the same with zsh in ~/.zshrc;\n'
         "fish: scantruss completion fish > ~/.config/fish/completions/scantruss.fish",
     )

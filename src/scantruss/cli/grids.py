@@ -1,4 +1,4 @@
-"""Grids and structures that commands read: saved by ScanTruss, or drawn by others."""
+"""Grids and structures that commands read: saved by ScanTruss, or drawn in other programs."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ def add_grid(parser: Parser, said: str, name: str = "grid", metavar: str = "GRID
     """Add the argument of a grid, and how one that others drew is read."""
     from .options import number
 
-    parser.add_argument(name, metavar=metavar, help=f"{said}, or lines or faces that others drew: {DRAWN}")
+    parser.add_argument(name, metavar=metavar, help=f"{said}, or lines or faces from another program: {DRAWN}")
     parser.add_argument(
         "--merge",
         metavar="D",
         type=number,
-        help="of lines that others drew: distance within which ends are one node (default: median length/1000)",
+        help="for lines from another program: ends closer than this become one node (default: median length/1000)",
     )
 
 

@@ -256,7 +256,7 @@ def _add_options(group: argparse._ArgumentGroup, specs: Iterable[Field[Any]]) ->
         elif spec.name in ("fixed_lines", "boundary"):
             options |= {"action": "append", "metavar": "FILE"}
             options["help"] += (
-                "; a text file of points X,Y,Z, an empty line or another `name` between two polylines; repeatable"
+                "; a text file of points X,Y,Z, with an empty line or a new `name` between polylines; repeatable"
             )
         elif spec.name == "symmetry":
             options["metavar"] = "auto|rotation|FILE"

@@ -32,7 +32,7 @@ def add_memory(parser: Parser) -> None:
         "--memory",
         metavar="SIZE",
         type=size_of_memory,
-        help="memory that a scan may take, e.g. 4GB; a larger one is thinned (default: half of what is free)",
+        help="memory that a scan may take, e.g. 4GB; a larger scan is thinned (default: half of the free memory)",
     )
 
 

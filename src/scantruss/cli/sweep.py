@@ -33,8 +33,8 @@ def sweep_parser() -> Parser:
         "sweep",
         "SCAN [--length 3,4,5] [--effort quick,normal ...] -o FOLDER [options]",
         "Make a grid for every combination of settings: a table and pictures, for choosing a design.\n"
-        "Every setting takes one value or several, separated by commas; the scan is read once. Without --length the length that\n"
-        "info suggests is taken.",
+        "Every setting takes one value or several, separated by commas; the scan is read once. Without\n"
+        "--length, the length that info suggests is used.",
     )
     parser.add_argument("scan", metavar="SCAN", help="scan file")
     parser.add_argument("-o", "--out", metavar="FOLDER", required=True, help="folder of the results")
