@@ -350,7 +350,7 @@ def test_a_sweep_leaves_no_grids_beside_a_table_that_does_not_know_them(
     for path in (place / "out").glob("length-6.*"):
         path.unlink()
     (place / "out" / "length-0.1.json").write_text("{}")
-    assert "length-0.1.json is there already" in refused(capsys, *words, "--length", "7,0.1")
+    assert "length-0.1.json exists already" in refused(capsys, *words, "--length", "7,0.1")
     (place / "out" / "length-0.1.json").write_text('{"made_by": "ScanTruss 0.1.0"}')
     assert main([*words, "--length", "7,0.1"]) == 0
     assert sorted(entry.name for entry in os.scandir("out") if entry.name.startswith("length")) == [

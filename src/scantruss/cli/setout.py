@@ -114,9 +114,7 @@ def setout_lines(made: SettingOut) -> list[str]:
         f" {len(made.boundaries):,} {'boundary' if len(made.boundaries) == 1 else 'boundaries'} unrolled"
     ]
     loose = [(number, step.props) for number, step in enumerate(made.steps) if len(step.props)]
-    lines.append(
-        f"{len(made.steps):,} steps of assembly, {len(made.steps) - len(loose):,} of them stable by themselves"
-    )
+    lines.append(f"{len(made.steps):,} steps of assembly, {len(made.steps) - len(loose):,} of them stable on their own")
     before: list[int] = []
     for number, props in loose:
         if (now := props.tolist()) != before:
@@ -125,5 +123,5 @@ def setout_lines(made: SettingOut) -> list[str]:
             lines.append(f"from step {number} on {len(now):,} {'prop' if len(now) == 1 else 'props'}: {named}{more}")
         before = now
     if len(made.steps[-1].props):
-        lines.append("warning: the whole does not stand by itself; use more supports or rigid joints")
+        lines.append("warning: the whole does not stand on its own; use more supports or rigid joints")
     return lines

@@ -107,7 +107,7 @@ def read_thinned_scan(path: str, settings: Settings, bars: Bars) -> PointCloud:
     unit = f" {cloud.unit}" if cloud.unit else ""
     bars.note(
         f"thinned while it was read, from {read:,} points to {len(cloud.points):,}, in boxes of {settings.thin_spacing:g}{unit};"
-        " --thin-spacing 0 takes all"
+        " --thin-spacing 0 keeps all points"
     )
     return cloud
 
@@ -157,8 +157,9 @@ def note_corners(bars: Bars, cloud: PointCloud, settings: Settings) -> None:
     length, unit = length_that_shows_corners(beyond, settings.length), unit_words(cloud.unit)
     if length > settings.length:
         bars.note(
-            f"the points are random and end {words_of_number(beyond, 2)}{unit} before the boundary on the mean, so corners may be missed,"
-            f" and some may be none; longer members, from {round_length(length, 'up'):g}{unit}, show them better, and --boundary gives them"
+            f"the points are random and end on average {words_of_number(beyond, 2)}{unit} before the boundary, so"
+            f" corners may be missed or false; longer members, from {round_length(length, 'up'):g}{unit}, show them better,"
+            " and --boundary gives them"
         )
 
 

@@ -103,7 +103,7 @@ def project_of(values: Namespace) -> Path | None:
     if place != source and place.exists():
         if not values.force:
             raise InputError(
-                f"{place} is there already; open it with: scantruss studio {place}, or save elsewhere with --project"
+                f"{place} exists already; open it with: scantruss studio {place}, or save elsewhere with --project"
             )
         check_ours(place, "result")
     return place

@@ -208,7 +208,7 @@ def with_system(model: Model, system: str) -> Model:
         )
     if model.truss is not None and model.truss.scale != 1.0:
         raise FormatError(
-            f"the structure is {model.truss.scale:g} times its scan, so its coordinates are of no reference system"
+            f"the structure is {model.truss.scale:g} times its scan, so its coordinates are in no reference system"
         )
     grid = None if model.grid is None else model.grid.replace(system=system)
     truss = None if model.truss is None else model.truss.replace(system=system)

@@ -23,7 +23,7 @@ def encode_step(model: Model, style: FileStyle) -> bytes:
     Raises
     ------
     FormatError
-        Bodies are asked for, and nothing says how thick the members of a grid are.
+        Bodies are asked for, and the members of a grid have no thickness.
     """
     return _encode_bodies(model, style) if style.step == "bodies" else _encode_axes(model)
 
@@ -31,9 +31,7 @@ def encode_step(model: Model, style: FileStyle) -> bytes:
 def _encode_bodies(model: Model, style: FileStyle) -> bytes:
     bodies = bodies_of(model, style)
     if bodies is None:
-        raise FormatError(
-            "STEP bodies need sections, and nothing says how thick the members of a grid are; give --tube"
-        )
+        raise FormatError("STEP bodies need sections, and the members of a grid have no thickness; give --tube")
     file = Part21(SCHEMA, "ScanTruss")
     context = _context(file, PREFIX["m"])
     members, balls = add_bodies(file, model, bodies)

@@ -221,7 +221,7 @@ def check_passed(grid: Grid, keep_failed: bool) -> None:
     """
     if grid.certificate is not None and not grid.certificate.passed and not keep_failed:
         words = " and ".join(fault.words for fault in grid.certificate.faults)
-        raise CertificateError(f"the grid failed its certificate: it {words}; --keep-failed uses it all the same", grid)
+        raise CertificateError(f"the grid failed its certificate: it {words}; --keep-failed uses it anyway", grid)
 
 
 def near(where: Place | None) -> str:

@@ -88,7 +88,7 @@ def check_alike(grid: Grid, tolerance: float, count: int, parts: str, number: in
     if len(grid.edges) == 0 or not grid.topology.manifold:
         raise InputError(f"few {parts} need a manifold grid with members")
     if number > MOST_ALIKE:
-        raise InputError(f"of {MOST_ALIKE:,} {parts} at most few kinds are made, got {number:,}")
+        raise InputError(f"few kinds are made of at most {MOST_ALIKE:,} {parts}, got {number:,}")
 
 
 def few_kinds(grid: Grid, parts: PartVectors, asked: Alike, progress: Progress | None = None) -> PartKinds:

@@ -12,7 +12,7 @@ MANY_HELD = 0.8  #: share of the nodes of a structure from which supports are od
 
 
 def support_words(truss: Truss) -> str:
-    """Return how many nodes are held, and how high they lie."""
+    """Return how many nodes are supported, and how high they lie."""
     held, used = _held(truss), np.unique(truss.members)
     z = truss.nodes[:, 2]
     low, high = (float(end) - float(z[used].min()) for end in (z[held].min(), z[held].max()))
@@ -32,7 +32,7 @@ def doubts_of(truss: Truss) -> list[str]:
     held, used = _held(truss), np.unique(truss.members)
     if len(held) > MANY_HELD * len(used):
         said.append(
-            f"{len(held):,} of {len(used):,} nodes are held; heights of supports are in metres, or with a unit: lowest:50mm"
+            f"{len(held):,} of {len(used):,} nodes are supported; heights of supports are in metres, or with a unit: lowest:50mm"
         )
     states = {each.state for each in truss.combinations}
     if truss.cases and truss.combinations and states != {"ULS", "SLS"}:

@@ -101,7 +101,7 @@ def solve_path(
         raise InputError(f"a path needs 1 step or more and a positive load factor, got {steps} and {stop_factor}")
     factored = factor_stiffness(truss)
     if factored.factor is None:
-        raise InputError("every node is held: there is no path of what cannot move")
+        raise InputError("every node is fixed, so nothing can move and there is no path")
     modes = buckling or _first_mode(factored, load)
     linear = float(modes.values[0]) if len(modes.values) else None
     case = combined_case(truss, modes.of)

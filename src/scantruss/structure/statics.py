@@ -274,7 +274,7 @@ def check_whole(truss: Truss) -> None:
         There is no support; a name stands twice; a load does not suit the joints; a settlement is of a node that is not held.
     """
     if not truss.supports.any():
-        raise InputError("no supports: hold some nodes, as with --supports boundary")
+        raise InputError("no supports: support some nodes, as with --supports boundary")
     names = [case.name for case in truss.cases] + [combination.name for combination in truss.combinations]
     if twice := next((name for name in names if names.count(name) > 1), ""):
         raise InputError(f"two load cases or combinations are named {twice!r}; give each a name of its own")

@@ -187,6 +187,6 @@ def _check_places(path: Path, record: Any, boxes: Boxes, rows: np.ndarray) -> No
         ends = np.sort(ends * record.scales[axis] + record.offsets[axis], axis=0)
         if (ends[0] < boxes.lower[rows, axis]).any() or (ends[1] > boxes.upper[rows, axis]).any():
             raise FormatError(
-                f"{path} has points outside the boxes that its COPC table gives them, so --crop may miss some; make it anew,"
-                " or plain LAZ of it (PDAL)"
+                f"{path} has points outside the boxes that its COPC table gives them, so --crop may miss some; write it"
+                " again, or convert it to plain LAZ (PDAL)"
             )

@@ -30,7 +30,7 @@ def check_header(path: Path) -> tuple[str, ...]:
         form, width, count = struct.unpack_from("<BHI", head, 104)
         scales = np.frombuffer(head, "<f8", 6, 131)
         if not np.isfinite(scales).all() or not scales[:3].all() or np.abs(scales).max() > 1e50:
-            raise FormatError(f"{path}: scale and offset of its LAS header are no sensible numbers; export it again")
+            raise FormatError(f"{path}: scale and offset of its LAS header are not sensible numbers; export it again")
         if length < LEAST_HEADER or start > size or length + RECORD * records > start:
             raise FormatError(
                 f"{path} ends early: its LAS header promises records and points behind its end; copy it again"

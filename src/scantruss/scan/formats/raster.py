@@ -31,7 +31,7 @@ def read_asc(path: Path, wanted: Sequence[str] = ()) -> Content:
         try:
             said[found[1].lower()] = float(found[2])
         except ValueError:
-            raise FormatError(f"{path}: {found[1]} is no number; the file is damaged") from None
+            raise FormatError(f"{path}: {found[1]} is not a number; the file is damaged") from None
         start = found.end()
     columns, rows = (said.get(name, 0.0) for name in ("ncols", "nrows"))
     wide, high = (said.get(name, said.get("cellsize", 0.0)) for name in ("dx", "dy"))
@@ -52,7 +52,7 @@ def read_asc(path: Path, wanted: Sequence[str] = ()) -> Content:
     try:
         heights = np.array(words, dtype=np.float64).reshape(int(rows), int(columns))
     except ValueError:
-        raise FormatError(f"{path} has a height that is no number; the file is damaged") from None
+        raise FormatError(f"{path} has a height that is not a number; the file is damaged") from None
     known = np.isfinite(heights) & (heights != said.get("nodata_value", np.nan))
     row, column = np.nonzero(known)
     x, y = corner[0] + column * wide, corner[1] + (int(rows) - 1 - row) * high  # the first row is the northernmost

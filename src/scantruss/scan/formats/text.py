@@ -267,7 +267,7 @@ def _check_names(
     if found is None or found != layout.columns or _differs(path, names.names, found, layout):
         raise FormatError(
             f"{path}: line {count_before() + names.number} ({names.line.strip()[:60]!r}) names the columns again,"
-            " but not as before; make a file of each part"
+            " but not as before; save each part as a file"
         )
 
 

@@ -174,7 +174,7 @@ def _whole(tile: Tile, wanted: Sequence[str]) -> Iterator[Content]:
     source = tile.source
     content = read_content(source.path, wanted)
     if (content.metres, content.z_metres) != (source.metres, source.z_metres):
-        raise FormatError(f"{source.path} says another unit than before; thin it when nobody writes to it")
+        raise FormatError(f"{source.path} states another unit than before; thin it while nothing writes to it")
     yield content
 
 
