@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from scantruss import PointCloud, Settings
-from scantruss.front.advance import new_front
+from scantruss.front.start import new_front
 from scantruss.kernels.front import front as lists
 from scantruss.kernels.front.fits import near_nodes
 from scantruss.kernels.surface.local_surface import PATCH_COLUMNS

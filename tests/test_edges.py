@@ -15,7 +15,7 @@ from typed import known
 import scantruss as st
 from scantruss.constraints.embedded_lines import add_half_edges, check_links, link_around
 from scantruss.errors import FrontError
-from scantruss.front import advance as driver
+from scantruss.front.start import new_front, start_front
 from scantruss.kernels.front import advance as kernels
 from scantruss.kernels.front import front as lists
 from scantruss.kernels.front import gaps
@@ -58,7 +58,7 @@ def initial_front(name: str) -> tuple[Front, SurfaceSamples, st.Settings]:
     settings = st.Settings(length=length)
     samples, boundary, constraints = steps_of(st.PointCloud.from_array(points()), settings)
     return (
-        driver.start_front(driver.new_front(samples, settings), samples, boundary, constraints, settings),
+        start_front(new_front(samples, settings), samples, boundary, constraints, settings),
         samples,
         settings,
     )

@@ -15,7 +15,7 @@ from steps import boundary_of, front_of, steps_of
 
 import scantruss as st
 from scantruss.boundary.find import characteristic_points
-from scantruss.front.advance import new_front, start_front
+from scantruss.front.start import new_front, start_front
 from scantruss.improve.flips import flip_edges
 from scantruss.kernels.front import cases, fits
 from scantruss.kernels.front import front as lists

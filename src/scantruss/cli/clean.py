@@ -99,7 +99,7 @@ def clean(values: Namespace) -> None:
 
 def _outputs(values: Namespace) -> tuple[list[Path], Path | None]:
     """Return where the results go, checked before anything is read."""
-    from ..runtime.files import check_place
+    from ..runtime.places import check_place
 
     outs, taken = claim_clouds(values, "clean cloud")
     report = check_place(values.report, (".json",)) if values.report else None

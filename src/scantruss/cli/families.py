@@ -90,7 +90,8 @@ def families(values: Namespace) -> None:
     """Write a saved grid with members of few lengths, or few kinds of joints or panels."""
     from ..export.formats import GRID, check_output
     from ..report.terminal import Bars, print_lines
-    from ..runtime.files import SaveTogether, check_place
+    from ..runtime.files import SaveTogether
+    from ..runtime.places import check_place
     from .convert import claim_models, write_models
 
     outs = [check_output(out, GRID) for out in outs_of(values)]

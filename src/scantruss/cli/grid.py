@@ -147,8 +147,8 @@ def command_line_of(values: Namespace) -> str:
 def check_outputs(values: Namespace, outs: list[Path], settings_file: Path, report: Path | None) -> None:
     """Refuse outputs that cannot be written, before anything is read or computed."""
     from ..export.formats import check_output
-    from ..runtime.files import check_place
     from ..runtime.ours import check_ours
+    from ..runtime.places import check_place
     from .convert import claim_models
 
     taken = inputs_of(values)

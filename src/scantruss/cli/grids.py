@@ -34,7 +34,7 @@ def read_saved_grid(path: str, merge: float | None, bars: Bars | None = None) ->
     from ..export.formats import FORMATS, read_model
     from ..export.json import read_grid
     from ..report.terminal import print_lines
-    from ..runtime.files import suffix_of
+    from ..runtime.places import suffix_of
 
     if (row := FORMATS.get(suffix_of(Path(path), FORMATS))) is None or row.draw is None:
         return read_grid(path)

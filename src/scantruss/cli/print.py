@@ -76,7 +76,8 @@ def print_solid(values: Namespace) -> None:
     """Make the printable model of a saved grid."""
     from ..export.printed.apart import print_apart
     from ..report.terminal import Bars, print_lines
-    from ..runtime.files import SaveTogether, check_place
+    from ..runtime.files import SaveTogether
+    from ..runtime.places import check_place
     from ..structure.layered import grid_in_metres
     from ..structure.truss import Truss
 

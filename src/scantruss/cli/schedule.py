@@ -120,7 +120,8 @@ def make_schedule(values: Namespace) -> None:
     from dataclasses import fields
 
     from ..report.terminal import Bars, print_lines
-    from ..runtime.files import SaveTogether, check_place
+    from ..runtime.files import SaveTogether
+    from ..runtime.places import check_place
     from ..schedules.files import SCHEDULE_SUFFIXES, schedule_paths, write_schedules
     from ..schedules.settings import ScheduleSettings
 

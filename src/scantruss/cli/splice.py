@@ -86,7 +86,7 @@ def names_of(files: list[Path]) -> list[str]:
 
 def check_outputs(values: Namespace) -> tuple[list[Path], Path]:
     """Return the clouds and the file of poses; what cannot be written is refused before anything is read or computed."""
-    from ..runtime.files import check_place
+    from ..runtime.places import check_place
 
     outs, taken = claim_clouds(values, "merged cloud")
     poses_file = check_place(outs[0].with_suffix(".poses.json"), (".json",))

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from ..structure.options import StructureSettings
     from ..structure.path import Path as StructurePath
     from ..structure.report import StructureReport
-    from ..structure.statics import Solution
+    from ..structure.results import Solution
     from ..structure.truss import Truss
     from .options import Parser
 
@@ -93,7 +93,8 @@ def structure(values: Namespace) -> None:
     """Make the structure of a saved grid, solve it and save it."""
     from ..export.formats import STRUCTURE, check_output, model_of
     from ..report.terminal import Bars, print_lines, print_table
-    from ..runtime.files import SaveTogether, check_place
+    from ..runtime.files import SaveTogether
+    from ..runtime.places import check_place
     from .convert import claim_models, write_models
 
     outs = [check_output(out, STRUCTURE, also=REPORT_SUFFIXES) for out in outs_of(values)]

@@ -86,8 +86,8 @@ def project_of(values: Namespace) -> Path | None:
     FormatError, InputError
         Nothing can be saved there, or another file is there.
     """
-    from ..runtime.files import check_place
     from ..runtime.ours import check_ours
+    from ..runtime.places import check_place
 
     suffix, source = ".scantruss", None if values.source is None else Path(values.source)
     opens = source is not None and source.suffix.lower() == suffix

@@ -159,8 +159,8 @@ def _lightest_line(trials: list[Trial], outcomes: list[Outcome]) -> list[str]:
 
 def claim_results(folder: Path, trials: list[Trial], taken: Taken, force: bool, more: tuple[str, ...] = ()) -> None:
     """Refuse a folder where a result cannot be written, or would replace something else."""
-    from ..runtime.files import check_place
     from ..runtime.ours import check_ours
+    from ..runtime.places import check_place
 
     names = (*SWEEP_FILES, *more, *(f"{trial.name}{end}" for trial in trials for end in (".json", ".png")))
     for name in names:

@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import FormatError, InputError
 from ..grid.grid import Grid
-from ..runtime.files import check_place, nearest_suffix, suffix_of, write_files
+from ..runtime.files import write_files
 from ..runtime.memory import nothing_collected
+from ..runtime.places import check_place, nearest_suffix, suffix_of
 from ..scan.cloud import PointCloud
 from ..scan.formats.extras import need_library
 from ..settings import UNITS
@@ -26,7 +27,7 @@ from .style import PAGE_POINTS, FileStyle
 
 if TYPE_CHECKING:
     from ..structure.report import StructureReport
-    from ..structure.statics import Solution
+    from ..structure.results import Solution
     from .drawing_in import Drawing
 
 Encoder = Callable[[Model, Path, FileStyle], dict[Path, bytes]]

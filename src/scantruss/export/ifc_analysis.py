@@ -17,7 +17,7 @@ from .model import STATIONS_WRITTEN, line_loads, temperatures
 from .part21 import Ref, Word, typed
 
 if TYPE_CHECKING:
-    from ..structure.statics import CaseResult
+    from ..structure.results import CaseResult
     from ..structure.truss import LoadCase, Truss
 
 SOURCES = {"permanent": ".DEAD_LOAD_G.", "snow": ".SNOW_S.", "wind": ".WIND_W.", "temperature": ".TEMPERATURE_T."}

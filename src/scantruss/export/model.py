@@ -24,7 +24,7 @@ from ..structure.layered import framework_of
 if TYPE_CHECKING:
     from ..scan.cloud import PointCloud
     from ..structure.report import StructureReport
-    from ..structure.statics import Solution
+    from ..structure.results import Solution
     from ..structure.truss import LoadCase, Truss
 
 

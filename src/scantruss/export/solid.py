@@ -14,7 +14,8 @@ from ..grid.certificate import check_passed
 from ..grid.grid import Grid
 from ..grid.marks import member_marks, node_marks
 from ..layouts.framework import outer_normals
-from ..runtime.files import check_place, write_files
+from ..runtime.files import write_files
+from ..runtime.places import check_place
 from .engraving import engraved, engraved_member
 from .solid_files import Solid, encode_3mf, encode_stl
 

@@ -11,7 +11,8 @@ from ..errors import InputError
 from ..grid.grid import Grid
 from ..structure.layered import framework_of, grid_of_triangles
 from ..structure.report import report_structure
-from ..structure.statics import MOMENT_Y, MOMENT_Z, solve
+from ..structure.results import MOMENT_Y, MOMENT_Z
+from ..structure.statics import solve
 
 if TYPE_CHECKING:
     from ..structure.truss import Truss

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..errors import InputError
 from .catalogue import Material, Section
-from .statics import MOMENT_Y, MOMENT_Z, SHEAR_Y, SHEAR_Z, CaseResult
+from .results import MOMENT_Y, MOMENT_Z, SHEAR_Y, SHEAR_Z, CaseResult
 from .truss import Truss
 
 CLAUSES = (

@@ -21,7 +21,7 @@ from ..layouts.double_layer import Layers
 from ..runtime.ours import MARK
 from .catalogue import Material, Section
 from .report import StructureReport
-from .statics import Solution
+from .results import Solution
 from .truss import Combination, LoadCase, Truss
 
 STRUCTURE_FORMAT = "scantruss-structure"

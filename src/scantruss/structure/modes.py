@@ -18,7 +18,8 @@ from ..errors import InputError
 from .frame import BEND_Y1, BEND_Z1, BOW, LENGTHEN, assemble, freedoms, inner_turns, member_freedoms, transforms
 from .lanczos import largest_eigenpairs
 from .mechanism import product
-from .statics import CaseResult, Factored, Solution
+from .results import CaseResult, Solution
+from .statics import Factored
 from .substructures import Factor, SingularError, factor_by_parts
 from .truss import GRAVITY, Truss
 

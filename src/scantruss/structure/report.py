@@ -17,8 +17,8 @@ from .layers import LayerChecks, check_layers
 from .modes import Modes
 from .path import Path
 from .path_report import path_figures, path_warnings, path_words
+from .results import CaseResult, Solution
 from .sizing import SizingRound
-from .statics import CaseResult, Solution
 from .truss import Truss
 
 MOST_UTILIZATION = 1000  #: that is written as a number

@@ -12,7 +12,8 @@ from .catalogue import Section, bundled_sections
 from .checks import MemberChecks, section_class, strengths, utilizations
 from .groups import WAYS_TO_GROUP, member_groups_of
 from .modes import worst_buckling
-from .statics import CaseResult, factor_stiffness, solve
+from .results import CaseResult
+from .statics import factor_stiffness, solve
 from .truss import Truss
 
 ROUNDS = 60  #: of solving and choosing

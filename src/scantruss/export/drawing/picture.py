@@ -15,8 +15,9 @@ import numpy as np
 
 from ...errors import words_of_number
 from ...grid.grid import Grid
-from ...runtime.files import check_place, write_files
+from ...runtime.files import write_files
 from ...runtime.ours import MARK
+from ...runtime.places import check_place
 from ...scan.cloud import SURVEY_UNITS, PointCloud
 from .camera import Camera, choose_camera
 from .left_out import Shown, shown_points

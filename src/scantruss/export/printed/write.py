@@ -12,7 +12,8 @@ from ...errors import InputError
 from ...grid.certificate import check_passed
 from ...grid.grid import Grid
 from ...grid.marks import member_marks, node_marks, numbered
-from ...runtime.files import check_place, write_files
+from ...runtime.files import write_files
+from ...runtime.places import check_place
 from ..csv import encode_table
 from ..engraving import letter_height
 from ..solid import SUFFIXES, as_solid

@@ -11,7 +11,7 @@ from ...structure.modes import Modes
 from ...structure.options import settings_text
 from ...structure.path_report import path_words
 from ...structure.report import StructureReport, use_words
-from ...structure.statics import Solution
+from ...structure.results import Solution
 from ...structure.truss import Truss
 from .charts import draw_nonlinear_path, draw_rounds, draw_weights
 from .first_page import first_page

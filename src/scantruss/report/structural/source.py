@@ -8,7 +8,7 @@ import numpy as np
 
 from ...structure.options import StructureSettings
 from ...structure.report import CaseFigures, StructureReport
-from ...structure.statics import CaseResult, Solution
+from ...structure.results import CaseResult, Solution
 
 
 @dataclass(frozen=True, eq=False)

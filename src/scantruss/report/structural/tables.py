@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...structure.report import CaseFigures, StructureReport, chosen_cases, use_words
-from ...structure.statics import MOMENT_Y, MOMENT_Z, CaseResult, Solution
+from ...structure.results import MOMENT_Y, MOMENT_Z, CaseResult, Solution
 from ...structure.truss import Truss
 from .parts import DataTable, ReportPart, SectionHead, Sentence
 from .source import ReportSource, axial_force, greatest_stresses

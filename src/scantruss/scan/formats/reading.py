@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import FormatError, InputError
-from ...runtime.files import nearest_suffix
+from ...runtime.places import nearest_suffix
 from ...selection import Selection
 from ..checks import degrees_note, extent_note, extent_of, single_precision_note
 from ..cloud import PointCloud
