@@ -12,7 +12,7 @@ from typed import known
 import scantruss as st
 from scantruss.check.certify import certify
 from scantruss.check.sheets import faults_on_sheets, nodes_of_samples
-from scantruss.kernels.boundary import loops as kernels
+from scantruss.kernels.boundary import room as kernels
 from scantruss.kernels.surface import normals as facing
 from scantruss.pipeline import grid_from_cloud
 from scantruss.surface.samples import sample_surface

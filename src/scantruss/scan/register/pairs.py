@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
+from itertools import chain
 
 import numpy as np
 
-from ...runtime.parallel import processors
+from ...runtime.parallel import threaded_map
 from .fine import Fit, align, judge
 from .matching import find_candidates
 from .scans import Scan
@@ -65,17 +66,11 @@ def find_pairs(
     progress: Callable[[str, float], None],
 ) -> list[Pair]:
     """Return the plausible pairs, up to `POSES_KEPT` for two scans; `wanted` selects the two."""
-    todo = list(wanted)
-    found: list[Pair] = []
-    pool = ThreadPoolExecutor(processors())
-    try:
-        tasks = [pool.submit(find_pair, scans, features, first, second) for first, second in todo]
-        for place, task in enumerate(tasks):
-            progress("match", place / len(tasks))
-            found += task.result()
-    finally:
-        pool.shutdown(cancel_futures=True)
-    return found
+
+    def plausible(two: tuple[int, int]) -> list[Pair]:
+        return find_pair(scans, features, *two)
+
+    return list(chain.from_iterable(threaded_map(plausible, list(wanted), partial(progress, "match"))))
 
 
 def find_pair(
