@@ -119,7 +119,7 @@ def symmetric_grid(
 ) -> Grid:
     """Return a grid that keeps mirror planes or a rotation exactly: one part with rows on its edges, and its images.
 
-    A first grid tells where the planes cut the surface; a second has these lines as fixed lines and is cut off along them.
+    A first grid shows where the planes cut the surface; a second has these lines as fixed lines and is cut off along them.
 
     Raises
     ------

@@ -115,11 +115,11 @@ def structure(values: Namespace) -> None:
     from ..structure.doubts import support_words
     from ..structure.modes import vibration_modes, worst_buckling
     from ..structure.path_report import encode_path, path_expectation
-    from ..structure.report import (
+    from ..structure.report import report_structure
+    from ..structure.report_lines import (
         STRUCTURE_HEAD,
         half_lines,
         mode_lines,
-        report_structure,
         sizing_lines,
         structure_lines,
         unlisted_lines,

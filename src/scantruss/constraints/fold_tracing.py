@@ -50,7 +50,7 @@ OFF_SCAN = 0.3  # a place farther from the scan than this has left it [member le
 LOOK_AROUND = 0.12  # radius within which the scan is looked for below a ridge [member lengths]
 SHARE_BELOW = 0.25  # share of that radius by which the scan may lie below a sharp ridge
 FAR_OFF = 0.08  # a place on a ridge farther from all points than this is moved to the nearest [member lengths]
-FEWEST_AROUND = 5  # fewest points from which it is told whether a place lies off them
+FEWEST_AROUND = 5  # fewest points that show whether a place lies off them
 PLACES_BETWEEN_CORNERS = (0.3, 0.5, 0.7)  # shares of the way between two corners at which a short ridge must be seen
 
 

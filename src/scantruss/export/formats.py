@@ -226,7 +226,7 @@ def write(
     style: FileStyle | None = None,
     report: StructureReport | None = None,
 ) -> list[Path]:
-    """Write a grid or a structure; the suffix of the path tells the format.
+    """Write a grid or a structure; the suffix of the path names the format.
 
     Parameters
     ----------
@@ -263,7 +263,7 @@ def write(
 
 
 def read_model(path: str | Path, merge: float | None = None) -> Model:
-    """Read a grid or a structure; the suffix of the path tells the format.
+    """Read a grid or a structure; the suffix of the path names the format.
 
     Parameters
     ----------

@@ -20,7 +20,7 @@ from ..grid.grid import Grid
 from ..runtime.ours import MARK
 from ..scan.checks import usual_extent
 from ..scan.cloud import PointCloud
-from ..structure.report import use_words
+from ..structure.checks import use_words
 from .model import Model, model_of_grid
 from .page_tables import Pin, colorings_of, pins_of, tables_of
 from .style import PAGE_POINTS, FileStyle

@@ -18,7 +18,7 @@ PREFIX = {"mm": ".MILLI.", "cm": ".CENTI.", "m": "$"}
 def encode_step(model: Model, style: FileStyle) -> bytes:
     """Return a STEP file: axes in the frame of the scan in the unit of the grid (inches and feet become metres), or bodies.
 
-    Bodies are in metres and relative to the origin, as kernels of CAD programs work to 1e-7 mm near 0; the product tells the origin.
+    Bodies are in metres and relative to the origin, as kernels of CAD programs work to 1e-7 mm near 0; the product has the origin.
 
     Raises
     ------

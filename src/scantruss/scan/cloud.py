@@ -113,7 +113,7 @@ class PointCloud:
         name : str
             File the points came from; messages start with it.
         normals : (N, 3) array, optional
-            Normals that came with the points: they tell the two sides of something thin apart.
+            Normals that came with the points: they distinguish the two sides of something thin.
 
         Returns
         -------
@@ -335,7 +335,7 @@ def _refine(
 
     Neighbours are sought in search boxes around the points of the sample, which grow until more than half of the sample have one
     (repeated points count each time); the others are farther away than the median. `some` distances to
-    the nearest of the sample (K,) tell where to begin.
+    the nearest of the sample (K,) say where to begin.
     """
     found = np.full(len(sample), math.inf)
     known = some[np.isfinite(some)]

@@ -47,7 +47,7 @@ def assembly_steps(truss: Truss, ring: np.ndarray, progress: Progress | None = N
     ring : (V,) int
         The step that adds each node, from 0; -1 for nodes without members.
     progress : callable, optional
-        Told what is done, and which share of it.
+        Called with what is done, and which share of it.
     """
     added = ring[truss.members].max(axis=1)
     _, moves = _stand(_part(truss, np.arange(len(added))), NONE, 0.0, give_up=True)

@@ -65,7 +65,7 @@ def set_out(
     keep_failed : bool
         Take a grid that failed its certificate too.
     progress : callable, optional
-        Told what is done, and which share of it.
+        Called with what is done, and which share of it.
 
     Raises
     ------

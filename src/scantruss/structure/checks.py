@@ -26,6 +26,7 @@ CLAUSES = (
 )
 #: imperfection factors of the buckling curves, table 6.1
 IMPERFECTION = {"a0": 0.13, "a": 0.21, "b": 0.34, "c": 0.49, "d": 0.76}
+MOST_UTILIZATION = 1000  #: that is written as a number
 NO_BUCKLING = 0.2  #: relative slenderness up to which a member does not buckle, 6.3.1.2(4)
 
 
@@ -204,3 +205,10 @@ def _twisting_load(truss: Truss, length: np.ndarray) -> np.ndarray:
     of, material = truss.of_section, truss.material
     polar = (of("inertia_y") + of("inertia_z")) / of("area")
     return (material.shear * of("torsion") + math.pi**2 * material.young * of("warping") / length**2) / polar
+
+
+def use_words(utilization: float | None) -> str:
+    """Return a utilization in words: of absurd loads only that it is beyond all measure."""
+    if utilization is None:
+        return "-"
+    return f"{utilization:.2f}" if utilization <= MOST_UTILIZATION else f"> {MOST_UTILIZATION:g}"

@@ -1,4 +1,4 @@
-"""What `scantruss structure` can be told: one record, from options and from a readable file (TOML or JSON)."""
+"""What `scantruss structure` is asked for: one record, from options and from a readable file (TOML or JSON)."""
 
 from __future__ import annotations
 

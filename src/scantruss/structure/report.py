@@ -1,4 +1,4 @@
-"""The report of a structure: its figures as plain values, and in words."""
+"""The report of a structure: its figures as plain values."""
 
 from __future__ import annotations
 
@@ -10,18 +10,16 @@ from typing import Any
 import numpy as np
 
 from ..errors import words_of_number
-from .checks import CLAUSES, MemberChecks, span_of, strengths, utilizations
+from .checks import CLAUSES, MemberChecks, span_of, strengths, use_words, utilizations
 from .doubts import doubts_of
 from .groups import member_groups_of
 from .layers import LayerChecks, check_layers
 from .modes import Modes
 from .path import Path
-from .path_report import path_figures, path_warnings, path_words
+from .path_report import path_figures, path_warnings
 from .results import CaseResult, Solution
 from .sizing import SizingRound
 from .truss import Truss
-
-MOST_UTILIZATION = 1000  #: that is written as a number
 
 
 @dataclass(frozen=True)
@@ -237,102 +235,3 @@ def _limits(truss: Truss, figures: Sequence[CaseFigures], checks: MemberChecks) 
             f" span/{checks.deflection:g} of the span {span:.3g} m"
         )
     return said
-
-
-def chosen_cases(report: StructureReport, most: int = 12) -> list[CaseFigures]:
-    """Return each load case, then the combinations that use the members or move the nodes most."""
-    cases = [case for case in report.cases if case.state == "case"]
-    others = [case for case in report.cases if case.state != "case"]
-    others.sort(key=lambda case: (case.state != "ULS", -(case.utilization_max or 0.0), -case.displacement_max))
-    chosen = [case for case in others if case.state == "ULS"][: most // 2]
-    chosen += sorted((case for case in others if case.state == "SLS"), key=lambda case: -case.displacement_max)[
-        : max(most // 12, 1)
-    ]
-    return cases + chosen
-
-
-def structure_lines(report: StructureReport) -> list[tuple[str, ...]]:
-    """Return rows of a table of `chosen_cases`; see `STRUCTURE_HEAD`."""
-    return [
-        (
-            case.name,
-            *(_kilonewtons(force, case) for force in (case.applied[2], case.reactions[2])),
-            words_of_number(1e3 * case.displacement_max, 3),
-            words_of_number(case.force_min / 1e3, 4),
-            words_of_number(case.force_max / 1e3, 4),
-            use_words(case.utilization_max),
-        )
-        for case in chosen_cases(report)
-    ]
-
-
-def _kilonewtons(force: float, case: CaseFigures) -> str:
-    """Return a force of a case for a table; 0 where it is rounding beside the forces in the members."""
-    rounding = 1e-9 * max(abs(case.force_min), abs(case.force_max))
-    return words_of_number(force / 1e3, 4) if abs(force) > rounding else "0"
-
-
-def unlisted_lines(report: StructureReport) -> list[str]:
-    """Return a line on how many combinations `structure_lines` leaves out; nothing where it has all."""
-    more = len(report.cases) - len(structure_lines(report))
-    which = (
-        "combinations, which use the members or move the nodes"
-        if more > 1
-        else "combination, which uses the members or moves the nodes"
-    )
-    return [f"and {more:,} more {which} less"] * (more > 0)
-
-
-def half_lines(report: StructureReport) -> list[str]:
-    """Return a line on the worst half of snow, where there are several."""
-    part_loaded = [case for case in report.cases if case.state == "case" and case.name.startswith("half-snow ")]
-    if len(part_loaded) < 2:
-        return []
-    moved = max(part_loaded, key=lambda case: case.displacement_max)
-    used = max(part_loaded, key=lambda case: case.utilization_max or 0.0)
-    which = "and" if used is moved else f"and {used.name}"
-    most = f", {which} uses the members most, {use_words(used.utilization_max)}" if used.utilization_max else ""
-    return [
-        f"of {len(part_loaded)} cases with half the snow, {moved.name} moves the nodes most, {1e3 * moved.displacement_max:.3g} mm{most}"
-    ]
-
-
-def use_words(utilization: float | None) -> str:
-    """Return a utilization in words: of absurd loads only that it is beyond all measure."""
-    if utilization is None:
-        return "-"
-    return f"{utilization:.2f}" if utilization <= MOST_UTILIZATION else f"> {MOST_UTILIZATION:g}"
-
-
-def mode_lines(report: StructureReport) -> list[str]:
-    """Return lines on buckling and vibration, where they were asked for."""
-    said = []
-    if report.buckling is not None:
-        factors = ", ".join(f"{value:.4g}" for value in report.buckling.values)
-        said.append(
-            f"buckling factors of {report.buckling.of}: {factors}" if factors else "no load makes the structure buckle"
-        )
-    if report.vibration is not None:
-        values = ", ".join(f"{value:.4g}" for value in report.vibration.values)
-        said.append(
-            f"natural frequencies: {values} Hz" if values else "no node can move, so there are no natural frequencies"
-        )
-    if report.path is not None:
-        said.append(path_words(report.path))
-    return said
-
-
-def sizing_lines(report: StructureReport) -> list[str]:
-    """Return a line where the sections are larger than the members need, so that the structure does not buckle too early."""
-    passed = [each for each in report.rounds if each.buckling is not None]
-    if len(passed) < 2:
-        return []
-    return [
-        f"all members pass at {passed[0].mass:,.0f} kg, but there the structure buckles at {passed[0].buckling:.3g} times its loads;"
-        f" larger sections raise that to {passed[-1].buckling:.3g}"
-    ]
-
-
-STRUCTURE_HEAD = (
-    "load case", "applied z [kN]", "reaction z [kN]", "moves [mm]", "force min [kN]", "force max [kN]", "utilization",
-)  # fmt: skip

@@ -89,7 +89,7 @@ def size_members(
     Parameters
     ----------
     truss : Truss
-        Its first section tells the kind.
+        Its first section gives the kind.
     count : int
         Different sections at most.
     checks : MemberChecks, optional

@@ -35,7 +35,7 @@ DEPTH_OF_LIMBS = 0.2
 # distance from the surface of the body from which on a point belongs to what was taken off or filled [voxels]
 OFF_BODY = 1.3
 WALL_SAMPLES = 0.12  # distance of the samples that wall off the inside [member lengths]
-NEIGHBORS_AT_BOUNDARY = 12  # samples around one that tell whether it lies at a boundary
+NEIGHBORS_AT_BOUNDARY = 12  # samples around one that show whether it lies at a boundary
 WIDEST_LINK = 0.8  # largest distance of linked samples between which there is a wall [member lengths]
 SPARSE_LINK = 2.0  # largest distance of such samples where points are sparse, in distances of the sixth neighbour
 DISC_RADIUS, DISC_CORNERS = 1.25, 12  # radius of a disc, in distances of the sixth neighbour, and its corners

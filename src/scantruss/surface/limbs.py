@@ -31,7 +31,7 @@ SURE_GIRTH = 0.95  # girth at the thinnest twentieth of a limb above which it is
 CLEAN_RING_SHARE = 0.8  # least share of the samples on each side of a ring that are on the right side
 NECK_GIRTH = 0.8  # girth down to which a neck before such an end stays [girth below which limbs are cut off]
 LOOKED_AROUND_RING = 0.4  # how far a ring is looked around for, beside its own radius [desired lengths]
-NEAR_PLANE = 0.3  # distance from the plane of a ring up to which points tell its shape [desired lengths]
+NEAR_PLANE = 0.3  # distance from the plane of a ring up to which points show its shape [desired lengths]
 RING_WAVES = 3  # of a ring: its radius is a Fourier series of so many terms
 WIDEST_GAP = 100.0  # largest angle without points, seen from the middle of a ring [degree]
 # girth of a ring below which it is no boundary but a hole that the front runs over [desired lengths]

@@ -93,7 +93,7 @@ def link_finer(
 ) -> tuple[Linked, float] | None:
     """Return finer samples and their radius if they form smooth sheets, else None.
 
-    Sheets that lie only a few samples apart look like one rough layer; finer samples tell them apart.
+    Sheets that lie only a few samples apart look like one rough layer; finer samples separate them.
     """
     for _ in range(MOST_REFINEMENTS):
         radius *= 0.5

@@ -16,7 +16,7 @@ END_REACH = 1.3  # distance from a rod up to which samples may be its ends [memb
 END_OFFSET = 0.1  # distance from the sheet above which a sample near a rod is an end of it [member lengths]
 MOST_RODS = 0.4  # share of the samples above which they are not rods but the scan itself
 END_ROUNDS = 3  # most rounds in which ends of rods are looked for
-FEWEST_SAMPLES_AROUND = 24  # samples in a usual neighbourhood from which a rod can be told from a sheet
+FEWEST_SAMPLES_AROUND = 24  # samples in a usual neighbourhood that distinguish a rod from a sheet
 ROD_DISTANCE = 0.8  # distance from all sheets at which a rod stands at one place at least [member lengths]
 
 

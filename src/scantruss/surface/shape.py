@@ -27,7 +27,7 @@ VOLUME_PLACES = 0.35
 FEWEST_SAMPLES_AROUND_PLACE = 30  # samples within a member below which all that lie there are looked at
 NEAREST_COUNTED = 16  # points around a place that always count
 LAYER_REACH = 0.7  # radius within which two layers are looked for [member lengths]
-CLOSE_LAYERS = 0.5  # distance below which a grid cannot tell two layers apart [member lengths]
+CLOSE_LAYERS = 0.5  # distance below which a grid sees two layers as one [member lengths]
 EACH_LAYER = 0.2  # least share of the points in each of two layers
 LAYER_DISTANCE = 4.0  # least distance between two layers [rms thickness of the thicker one]
 # share of the places with two layers from which on they are reported where they have become one by smoothing
@@ -121,7 +121,7 @@ def layers_of_surface(samples: SurfaceSamples) -> tuple[float, float]:
 
 
 def _layer_distance(points: np.ndarray) -> float:
-    """Return the distance between two layers of points (N, 3), 0 if they cannot be told apart."""
+    """Return the distance between two layers of points (N, 3), 0 if they look like one."""
     centred = points - points.mean(axis=0)
     _, _, axes = np.linalg.svd(centred, full_matrices=False)
     height = np.sort(centred @ axes[2])

@@ -110,7 +110,7 @@ def plot_grid(grid: Grid, cloud: PointCloud | None, views: tuple[str, ...], size
 
 
 def known_upward(grid: Grid, cloud: PointCloud | None) -> np.ndarray | None:
-    """Return the direction against gravity (3,) if unit or file tell it: scans of buildings and terrain have z up."""
+    """Return the direction against gravity (3,) if unit or file give it: scans of buildings and terrain have z up."""
     known = grid.unit in SURVEY_UNITS or (cloud is not None and cloud.z_is_up)
     return UP if known else None
 

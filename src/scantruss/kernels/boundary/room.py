@@ -25,7 +25,7 @@ def normals_along(surface: Surface, curve: np.ndarray, sample: int, normals: np.
 def _beside(d: Vector, a: Vector, b: Vector) -> bool:
     """Whether two places at a distance d with normals a and b may lie side by side on one sheet, not one over the other.
 
-    On a bend the chord dips below the plane at one end and rises through that at the other: only the mean plane tells.
+    On a bend the chord dips below the plane at one end and rises through that at the other: only the mean plane decides.
     """
     rise = dot(d, a) + dot(d, b)
     facing = dot(a, b)

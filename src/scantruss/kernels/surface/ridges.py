@@ -35,9 +35,9 @@ NEAR = 0.375  # points nearer to the line than this are left out where its sides
 MIDDLE_OF_SIDES = 0.5 * (1.0 + NEAR)  # of the points that are taken [radius]
 # how far from the line the sides of a rounded fold may meet, at least and at most [radius]
 LEAST_MEETING, FARTHEST_MEETING = 0.2, 0.4
-SHARP_ENOUGH = 0.7  # angle of a fold from which the place where its sides meet can be told [radian]
+SHARP_ENOUGH = 0.7  # angle of a fold from which the place where its sides meet is certain enough [radian]
 FEWEST_OF_FLANK = 6  # fewest points of a side
-POINTS_OF_FIRST_LOOK = 2  # points of a sample that tell at first sight
+POINTS_OF_FIRST_LOOK = 2  # points of a sample that are looked at first
 
 
 @kernel
@@ -144,7 +144,7 @@ def flank(
     radius: float,
     side: float,
 ) -> tuple[float, float, float, float, bool]:
-    """One side (1 or -1) of a fold in the plane across it, as far as it can be told, which is returned last.
+    """One side (1 or -1) of a fold in the plane across it; whether it could be fitted is returned last.
 
     Its direction and how much it bends [radian]; how far across and how high its middle is [radius].
 

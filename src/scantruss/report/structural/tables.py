@@ -6,7 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ...structure.report import CaseFigures, StructureReport, chosen_cases, use_words
+from ...structure.checks import use_words
+from ...structure.report import CaseFigures, StructureReport
+from ...structure.report_lines import chosen_cases
 from ...structure.results import MOMENT_Y, MOMENT_Z, CaseResult, Solution
 from ...structure.truss import Truss
 from .parts import DataTable, ReportPart, SectionHead, Sentence

@@ -65,7 +65,7 @@ def read_head(path: Path) -> bytes:
 
 
 def kind_of(head: bytes) -> str:
-    """Return the kind of a file by its first bytes; "" if they tell nothing."""
+    """Return the kind of a file by its first bytes; "" if they are of no known one."""
     for signature, kind in _SIGNATURES:
         if head.startswith(signature):
             return kind

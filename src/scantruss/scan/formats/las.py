@@ -136,7 +136,7 @@ def write_las(path: Path, cloud: Cloud) -> None:
     Raises
     ------
     InputError
-        The points lie so densely in so wide a box that whole numbers of 32 bits cannot tell them apart.
+        The points lie so densely in so wide a box that whole numbers of 32 bits cannot distinguish them.
     """
     import laspy
     import lazrs

@@ -1,7 +1,7 @@
 """Scans that would fit elsewhere as well: each is tested against all the others together, in every plausible place.
 
 On a shape that looks the same when rotated, or slides on itself, scans agree in a wrong place as well as in the right one, and
-nothing in them tells which is which.
+nothing in them shows which is which.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The pose graph: scans joined pair by pair, the surest pairs first; a pair that contradicts earlier ones is rejected.
 
 Joined scans are a group. A pair between two groups puts every scan of one over every scan of the other, and all of them must
-agree: that tells a wrong pair, which may look right by itself, from a right one.
+agree: that distinguishes a wrong pair, which may look right on its own, from a right one.
 """
 
 from __future__ import annotations

@@ -229,7 +229,7 @@ def _tiles_for(sources: Sequence[Source], workers: Workers) -> _Tiles:
 
 
 def _rows_of(tile: Tile, shared: tuple[Reading, float, bool]) -> tuple[BoxRows, ReadSummary]:
-    """Return the boxes of a tile and what its chunks tell: the work of a worker."""
+    """Return the boxes of a tile and what its chunks report: the work of a worker."""
     reading, spacing, boundary = shared
     thinning, summary = Thinning(spacing, boundary=boundary), ReadSummary()
     for chunk in _chunks_there(tile, reading):

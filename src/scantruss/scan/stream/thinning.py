@@ -57,7 +57,7 @@ class Thinning:
     spacing : float
         Side of a box [scan unit].
     boundary : bool
-        Keep the extremes of each box too, so that `points_at_boundary` can tell the boundary.
+        Keep the extremes of each box too, so that `points_at_boundary` can find the boundary.
     """
 
     def __init__(self, spacing: float, *, boundary: bool = False) -> None:
