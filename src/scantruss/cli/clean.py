@@ -54,8 +54,8 @@ def clean_parser() -> Parser:
         steps.add_argument(
             f"--{name}", metavar=metavar, type=number, default=default, help=f"{words} (default {default})"
         )
-        keep, said = KEEP_OPTIONS[name]
-        steps.add_argument(f"--{keep}", action="store_true", help=said)
+        keep, about = KEEP_OPTIONS[name]
+        steps.add_argument(f"--{keep}", action="store_true", help=about)
     steps.add_argument("--no-smooth", action="store_true", help="leave points where they are: remove no noise")
     steps.add_argument(
         "--spacing",
@@ -93,8 +93,8 @@ def clean(values: Namespace) -> None:
             save.json(report, figures_of_cleaning(result, len(cloud.points)))
     lines = [f"{len(cloud.points):,} points read"] + [step.words for step in result.steps]
     written = [*map(str, outs), *([str(report)] if report else [])]
-    said = [note for out in outs for note in cloud_file_notes(out)]
-    print_lines([*lines, f"wrote {' '.join(written)}: {len(result.points):,} points", *said])
+    notes = [note for out in outs for note in cloud_file_notes(out)]
+    print_lines([*lines, f"wrote {' '.join(written)}: {len(result.points):,} points", *notes])
 
 
 def _outputs(values: Namespace) -> tuple[list[Path], Path | None]:

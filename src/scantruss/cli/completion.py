@@ -83,8 +83,8 @@ def _fish(parsers: Parsers) -> str:
     lines = [f"complete -c scantruss -n __fish_use_subcommand -f -a '{' '.join(parsers)}'"]
     for name, parser in parsers.items():
         when = f"-n '__fish_seen_subcommand_from {name}'"
-        for option, (words, said) in _options(parser).items():
-            short = said.replace("%%", "%").split(";")[0].replace("'", "\\'")
+        for option, (words, about) in _options(parser).items():
+            short = about.replace("%%", "%").split(";")[0].replace("'", "\\'")
             takes = f" -x -a '{words}'" if words else ""
             lines.append(f"complete -c scantruss {when} -l {option[2:]}{takes} -d '{short}'")
     lines.append(f"complete -c scantruss -n '__fish_seen_subcommand_from completion' -x -a '{' '.join(SHELLS)}'")

@@ -16,11 +16,11 @@ HEAD = 200  # bytes of a file in which its format stands
 DRAWN = ".obj .ply .dxf .3dm .ifc .compas.json"  # that `read_model` reads
 
 
-def add_grid(parser: Parser, said: str, name: str = "grid", metavar: str = "GRID") -> None:
+def add_grid(parser: Parser, about: str, name: str = "grid", metavar: str = "GRID") -> None:
     """Add the argument of a grid, and how one that others drew is read."""
     from .options import number
 
-    parser.add_argument(name, metavar=metavar, help=f"{said}, or lines or faces from another program: {DRAWN}")
+    parser.add_argument(name, metavar=metavar, help=f"{about}, or lines or faces from another program: {DRAWN}")
     parser.add_argument(
         "--merge",
         metavar="D",

@@ -21,11 +21,11 @@ def print_parser() -> Parser:
     from .options import Parser, add_outs, number, scale
 
     usage = "GRID|STRUCTURE OUT.3mf|OUT.stl --member-diameter D --node-diameter D [--scale S] [--marks] [--bed WxDxH] [--sockets]"
-    said = (
+    about = (
         "Make watertight solids of members and nodes for a 3D printer: one solid, or parts with plug joints that fit the bed,\n"
         "or balls with sockets for rods. Lengths are those of the model, in the unit of the grid."
     )
-    parser = Parser("print", usage, said)
+    parser = Parser("print", usage, about)
     add_grid(parser, "grid or structure saved as .json by scantruss grid or structure (a structure is in metres)")
     add_outs(parser, "model, .3mf or .stl", "?")
     parser.add_argument(

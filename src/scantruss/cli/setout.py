@@ -37,7 +37,7 @@ def setout_parser() -> Parser:
     add_grid(parser, "grid or structure saved as .json by scantruss grid or structure")
     add_outs(parser, "drawing .dxf or .pdf; tables .xlsx or .csv: the supports, with the other tables beside it", "*")
     units = "|".join(unit for unit in UNITS if unit)
-    for name, metavar, kind, said in (
+    for name, metavar, kind, about in (
         ("supports", "WHERE", str, "for a grid: corners, boundary, lowest:H, fixed, ends, line:NAME, loop:N, N001, or several joined by +"),
         ("joints", "TYPE", str, "for a grid: rigid (default) or pinned, during assembly"),
         ("scale", "S", scale, "for a grid: size of the structure over that of the grid (default 1)"),
@@ -47,7 +47,7 @@ def setout_parser() -> Parser:
         ("spacing", "MM", number, "distance between sections across x and y of the building frame"),
         ("paper", "A4|A3|A2|A1|A0", str, "size of the pages of a .pdf (default A3)"),
     ):  # fmt: skip
-        parser.add_argument(f"--{name}", metavar=metavar, type=kind, default=SUPPRESS, help=said)
+        parser.add_argument(f"--{name}", metavar=metavar, type=kind, default=SUPPRESS, help=about)
     parser.add_argument(
         "--section",
         metavar="AXIS=MM",

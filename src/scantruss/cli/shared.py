@@ -52,10 +52,10 @@ def read_scan(path: str, settings: Settings, bars: Bars) -> PointCloud:
 
 def report_cloud(bars: Bars, cloud: PointCloud | Thinned, name: str = "") -> None:
     """Report what was left out or converted, with the name of the cloud if it is one of several."""
-    said = list(cloud.notes)
+    notes = list(cloud.notes)
     if cloud.dropped:
-        said.append(f"{cloud.dropped:,} points with NaN or infinite coordinates are left out")
-    for note in said:
+        notes.append(f"{cloud.dropped:,} points with NaN or infinite coordinates are left out")
+    for note in notes:
         bars.note(note if name in note else f"{name}: {note}")
 
 

@@ -78,9 +78,9 @@ def structure_parser() -> Parser:
     parser.add_argument(
         "--settings", metavar="FILE", help="all of these options in a .toml or .json file, with combinations and limits"
     )
-    for name, metavar, said in OWN_OPTIONS:
+    for name, metavar, about in OWN_OPTIONS:
         kind = {"NUMBER": number, "COUNT": whole_number, "SCALE": scale, "SHARE": share}.get(metavar, str)
-        parser.add_argument("--" + name.replace("_", "-"), metavar=metavar, type=kind, default=SUPPRESS, help=said)
+        parser.add_argument("--" + name.replace("_", "-"), metavar=metavar, type=kind, default=SUPPRESS, help=about)
     parser.add_argument("--path-plot", metavar="FILE.png", help="picture of the path: load factor against displacement")
     parser.add_argument(
         "--dry-run", action="store_true", help="print the size and time of the path without computing it"
@@ -287,7 +287,7 @@ def _notes(settings: StructureSettings) -> list[str]:
     from ..structure.options import units_taken
 
     words = [str(load.get("load", "")) if isinstance(load, dict) else str(load) for load in settings.loads]
-    said = units_taken(settings.loads)
+    notes = units_taken(settings.loads)
     if any(word.startswith("wind:") and ":" not in word[5:] for word in words):
-        said += ["wind without a coefficient presses with 1.0 everywhere; give one, as in wind:0.8kN/m2:-0.7"]
-    return said
+        notes += ["wind without a coefficient presses with 1.0 everywhere; give one, as in wind:0.8kN/m2:-0.7"]
+    return notes

@@ -102,8 +102,8 @@ def sweep(values: Namespace) -> None:
         if fitting.thin_spacing:
             thin = {"thin_spacing": fitting.thin_spacing}
             trials = [replace(trial, settings=trial.settings.replace(**thin)) for trial in trials]
-        said = note_compiling(bars)
-        with said, workers_of(values, bars, None if len(trials) > 1 else 1) as workers:
+        compiling = note_compiling(bars)
+        with compiling, workers_of(values, bars, None if len(trials) > 1 else 1) as workers:
             outcomes = make_grids(cloud, trials, workers, bars, variants)
         head, rows = head_of(varied, cloud.unit), rows_of(trials, outcomes)
         if not any(outcome.grid for outcome in outcomes):

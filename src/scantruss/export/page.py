@@ -177,8 +177,8 @@ def _certificate(model: Model, pins: Sequence[Pin]) -> str:
         return ""
     if (certificate := model.grid.certificate) is None:
         return "<h2>Certificate</h2><p>None: this grid was not checked against its scan.</p>"
-    said = [f"warning: the grid {warning.words}{near(warning.where)}" for warning in certificate.warnings]
-    words = [f'<p class="warn">{escape(each)}</p>' for each in said]
+    warnings = [f"warning: the grid {warning.words}{near(warning.where)}" for warning in certificate.warnings]
+    words = [f'<p class="warn">{escape(each)}</p>' for each in warnings]
     buttons = [
         f'<button class="place" data-place="{k}"><span>{k + 1} {escape(pin.words)}</span><span>{escape(pin.value)}</span></button>'
         for k, pin in enumerate(pins)

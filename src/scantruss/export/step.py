@@ -103,12 +103,12 @@ def _context(file: Part21, prefix: str) -> Ref:
     )
 
 
-def _product(file: Part21, shape: Ref, said: str) -> None:
+def _product(file: Part21, shape: Ref, description: str) -> None:
     """Add what makes a product of a shape."""
     application = file.add("APPLICATION_CONTEXT", "automotive design")
     file.add("APPLICATION_PROTOCOL_DEFINITION", "international standard", "automotive_design", 2000, application)
     product = file.add(
-        "PRODUCT", "ScanTruss", "ScanTruss", said, (file.add("PRODUCT_CONTEXT", "", application, "mechanical"),)
+        "PRODUCT", "ScanTruss", "ScanTruss", description, (file.add("PRODUCT_CONTEXT", "", application, "mechanical"),)
     )
     file.add("PRODUCT_RELATED_PRODUCT_CATEGORY", "part", None, (product,))
     version = file.add("PRODUCT_DEFINITION_FORMATION", "", "", product)

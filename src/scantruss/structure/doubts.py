@@ -28,10 +28,10 @@ def support_words(truss: Truss) -> str:
 
 def doubts_of(truss: Truss) -> list[str]:
     """Return warnings of a structure on its side, of supports that hold most of it, and of combinations that leave out something."""
-    said = _sideways(truss)
+    warnings = _sideways(truss)
     held, used = _held(truss), np.unique(truss.members)
     if len(held) > MANY_HELD * len(used):
-        said.append(
+        warnings.append(
             f"{len(held):,} of {len(used):,} nodes are supported; heights of supports are in metres, or with a unit: lowest:50mm"
         )
     states = {each.state for each in truss.combinations}
@@ -41,8 +41,10 @@ def doubts_of(truss: Truss) -> list[str]:
             if "SLS" not in states
             else "ULS, so members are checked for single cases"
         )
-        said.append(f"the combinations that were given have none of {missing}; those of EN 1990 are not added to them")
-    return said
+        warnings.append(
+            f"the combinations that were given have none of {missing}; those of EN 1990 are not added to them"
+        )
+    return warnings
 
 
 def _sideways(truss: Truss) -> list[str]:

@@ -165,30 +165,30 @@ def report_structure(
             more = each.max(axis=1) > worst
             worst[more], clause[more], load[more] = each.max(axis=1)[more], each.argmax(axis=1)[more], number
     governing = tuple(f"{CLAUSES[c]}, {figures[k].name}" for c, k in zip(clause, load, strict=True))
-    said = [*truss.warnings, *doubts_of(truss), *notes]
+    warnings = [*truss.warnings, *doubts_of(truss), *notes]
     if not strength.known:
         why = "not steel" if truss.material.kind != "steel" else "of class 4 (EN 1993-1-1 table 5.2)"
-        said.append(f"no member is checked: {truss.material.name} {truss.sections[0].name} is {why}")
+        warnings.append(f"no member is checked: {truss.material.name} {truss.sections[0].name} is {why}")
     elif (over := int((worst > 1).sum())) > 0:
         most = int(worst.argmax())
         words = f"{truss.member_marks[most]} {use_words(worst[most])} by {governing[most]}"
-        said.append(
+        warnings.append(
             f"{over:,} of {len(worst):,} members {'is' if over == 1 else 'are'} used beyond 1, the most {words}"
         )
-    said += _limits(truss, figures, checks)
+    warnings += _limits(truss, figures, checks)
     if buckling is not None and (least := float(buckling.values.min(initial=math.inf))) < checks.buckling_factor:
         less = f"the structure buckles at {least:.3g} times {buckling.of}"
         enough = f"less than {checks.buckling_factor:g}: analysis of first order and its checks are not enough (EN 1993-1-1 5.2.1(3))"
-        said.append(f"{less}: it does not carry this load" if least < 1.0 else f"{less}, {enough}")
+        warnings.append(f"{less}: it does not carry this load" if least < 1.0 else f"{less}, {enough}")
     layers = check_layers(truss) if truss.member_sets else None
-    said += layers.warnings(truss) if layers is not None else []
-    said += path_warnings(path) if path is not None else []
+    warnings += layers.warnings(truss) if layers is not None else []
+    warnings += path_warnings(path) if path is not None else []
     return StructureReport(
         truss=truss,
         cases=tuple(figures),
         utilization=worst if strength.known else None,
         governing=governing if strength.known else (),
-        warnings=tuple(said),
+        warnings=tuple(warnings),
         buckling=buckling,
         vibration=vibration,
         rounds=tuple(rounds),
@@ -216,12 +216,12 @@ def _figures_of(result: CaseResult, used: np.ndarray | None) -> CaseFigures:
 
 def _limits(truss: Truss, figures: Sequence[CaseFigures], checks: MemberChecks) -> list[str]:
     """Return warnings of slender members and great displacements."""
-    said = []
+    warnings = []
     radius = np.array([section.radius for section in truss.sections])[truss.section_of]
     slender = checks.effective_length * truss.lengths / radius
     if (over := slender > checks.slenderness).any():
         first = truss.member_marks[int(slender.argmax())]
-        said.append(
+        warnings.append(
             f"{over.sum():,} of {len(over):,} members are more slender than {checks.slenderness:g}, the most {first} with"
             f" {slender.max():.0f}"
         )
@@ -230,8 +230,8 @@ def _limits(truss: Truss, figures: Sequence[CaseFigures], checks: MemberChecks) 
     span = span_of(truss)
     if span > 0 and most.displacement_max > span / checks.deflection:
         ratio = span / most.displacement_max if most.displacement_max else math.inf
-        said.append(
+        warnings.append(
             f"the displacement of {words_of_number(1e3 * most.displacement_max, 3)} mm under {most.name} is span/{ratio:.0f}, more than"
             f" span/{checks.deflection:g} of the span {span:.3g} m"
         )
-    return said
+    return warnings

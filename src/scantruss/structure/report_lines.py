@@ -72,20 +72,20 @@ def half_lines(report: StructureReport) -> list[str]:
 
 def mode_lines(report: StructureReport) -> list[str]:
     """Return lines on buckling and vibration, where they were asked for."""
-    said = []
+    lines = []
     if report.buckling is not None:
         factors = ", ".join(f"{value:.4g}" for value in report.buckling.values)
-        said.append(
+        lines.append(
             f"buckling factors of {report.buckling.of}: {factors}" if factors else "no load makes the structure buckle"
         )
     if report.vibration is not None:
         values = ", ".join(f"{value:.4g}" for value in report.vibration.values)
-        said.append(
+        lines.append(
             f"natural frequencies: {values} Hz" if values else "no node can move, so there are no natural frequencies"
         )
     if report.path is not None:
-        said.append(path_words(report.path))
-    return said
+        lines.append(path_words(report.path))
+    return lines
 
 
 def sizing_lines(report: StructureReport) -> list[str]:

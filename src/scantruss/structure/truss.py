@@ -211,13 +211,13 @@ class Truss:
     def warnings(self) -> list[str]:
         """What is odd about the size, in words."""
         low, high = USUAL_MEMBER
-        said = []
+        warnings = []
         if (middle := float(np.median(self.lengths))) < low or middle > high:
-            said.append(
+            warnings.append(
                 f"members of {_readable(middle)} (median) at scale {self.scale:g}: usual are {low:g} to {high:g} m;"
                 " check --scale and the unit of the grid"
             )
-        return said
+        return warnings
 
 
 def local_axes(x: np.ndarray, normals: np.ndarray) -> np.ndarray:

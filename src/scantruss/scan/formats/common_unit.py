@@ -54,10 +54,10 @@ def to_one_unit(path: Path, content: Content, unit: str, z_unit: str) -> tuple[n
             " such as UTM first (QGIS, PDAL filters.reprojection); where the file is wrong, --unit says the unit"
         )
     notes = []
-    said, metres, z_metres = name_of(content.metres), content.metres, content.z_metres
-    name, scale = unit or said, 1.0
-    if unit and metres and said != unit:
-        notes.append(f"{path.name} says that its unit is {said or f'{metres:g} m'}; --unit {unit} overrides it")
+    named, metres, z_metres = name_of(content.metres), content.metres, content.z_metres
+    name, scale = unit or named, 1.0
+    if unit and metres and named != unit:
+        notes.append(f"{path.name} says that its unit is {named or f'{metres:g} m'}; --unit {unit} overrides it")
         z_metres = None
     elif metres and not name:
         name, scale = "m", metres
@@ -70,6 +70,6 @@ def to_one_unit(path: Path, content: Content, unit: str, z_unit: str) -> tuple[n
         return content.points * scale if scale != 1.0 else content.points, name, tuple(notes)
     other = name_of(z_metres) or f"units of {z_metres:g} m"
     notes.append(
-        f"the heights of {path.name} are in {other}, x and y in {said or name}: the heights are converted to {name}"
+        f"the heights of {path.name} are in {other}, x and y in {named or name}: the heights are converted to {name}"
     )
     return content.points * [scale, scale, z_metres / size], name, tuple(notes)

@@ -100,5 +100,5 @@ def reading_as(path: Path, kind: str) -> Iterator[None]:
     except BaseException as error:
         if not (isinstance(error, Exception) or type(error).__name__ == "PanicException"):  # Rust's, not an Exception
             raise
-        said = " ".join((str(error).strip() or type(error).__name__).split())[:120]
-        raise FormatError(f"{path} cannot be read as {kind} ({said}); copy or export it again") from None
+        reason = " ".join((str(error).strip() or type(error).__name__).split())[:120]
+        raise FormatError(f"{path} cannot be read as {kind} ({reason}); copy or export it again") from None

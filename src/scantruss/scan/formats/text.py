@@ -228,9 +228,9 @@ def read_ragged(
 
 def _no_point(path: Path, layout: Layout, number: int, row: Sequence[str]) -> FormatError:
     columns = ", ".join(str(column + 1) for column in layout.columns[-3:])
-    said = " ".join(row)[:60]
+    shown = " ".join(row)[:60]
     return FormatError(
-        f"{path}: line {number} ({said!r}) has no numbers x, y, z in columns {columns}; correct or delete it"
+        f"{path}: line {number} ({shown!r}) has no numbers x, y, z in columns {columns}; correct or delete it"
     )
 
 
