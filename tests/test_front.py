@@ -1,4 +1,4 @@
-"""The advancing front leaves a right grid behind: manifold, of the right topology, facing outwards, from rim to rim."""
+"""The advancing front leaves a right grid behind: manifold, of the right topology, facing outwards, from boundary to boundary."""
 
 from collections.abc import Callable, Iterable
 from functools import cache
@@ -111,7 +111,7 @@ def test_triangles_are_anticlockwise_seen_from_outside(name: str, method: str) -
 @pytest.mark.parametrize("method", METHODS)
 @pytest.mark.parametrize("name", CLOUDS)
 def test_every_boundary_segment_is_an_edge_with_one_triangle(name: str, method: str) -> None:
-    """And nothing else is open: the rim of the grid is the divided boundary."""
+    """And nothing else is open: the boundary of the grid is the divided boundary."""
     grid, boundary, _ = example(name, method)
     edges = naive.directed_edges(grid.triangles)
     rim = {e for e in edges if (e[1], e[0]) not in edges}

@@ -86,12 +86,25 @@ def advance_fronts(
     *,
     progress: Progress | None = None,
 ) -> list[Grid]:
-    """Return what the fronts leave behind that advance over a scan, one for each field; one front is `front.advance.advance_front`.
+    """Return the grids that fronts leave behind, one front for each field; a front is `front.advance.advance_front`.
+
+    Parameters
+    ----------
+    samples : SurfaceSamples
+        The surface samples of the scan.
+    boundary : Boundary
+    constraints : Constraints
+        Fixed nodes, fixed lines and ridges.
+    fields : sequence of Field
+        Those of `orientation_fields`.
+    settings : Settings
+    progress : callable, optional
+        Called with ("front", share); may raise to stop.
 
     Raises
     ------
     FrontError
-        None has come to its end; the fault of the first.
+        No front came to its end; the fault of the first.
     """
     see = seer_of(progress)
     first = progress if len(fields) == 1 or see is None else WatchedProgress(None, see)  # of several one is seen
@@ -326,7 +339,26 @@ def optimize_fronts(
     *,
     progress: Progress | None = None,
 ) -> Grid:
-    """Return the best grid that comes of some fronts and passes the checks, with its certificate (Sec. 4)."""
+    """Return the best grid that can be made of some fronts and passes the checks, with its certificate (Sec. 4).
+
+    Parameters
+    ----------
+    fronts : sequence of Grid
+        Those of `advance_fronts`.
+    samples : SurfaceSamples
+        The surface samples of the scan.
+    boundary : Boundary
+    constraints : Constraints
+        Fixed nodes, fixed lines and ridges.
+    settings : Settings
+    progress : callable, optional
+        Called with ("optimize", share); may raise to stop.
+
+    Raises
+    ------
+    FrontError
+        No grid passes; the fault of the first.
+    """
     improved = improve_fronts(fronts, samples, boundary, constraints, settings, progress=progress)
     return best_that_passes(improved, samples, boundary, constraints, settings, progress=progress)
 

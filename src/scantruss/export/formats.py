@@ -48,7 +48,7 @@ class FileFormat:
     needs_unit: bool = False  #: whether a grid without a unit is refused
     wants_system: bool = False  #: whether programs need the reference system to place it
     read: Callable[[Path], Model] | None = None
-    draw: Callable[[Path], Drawing] | None = None  #: reads lines and faces that others drew
+    draw: Callable[[Path], Drawing] | None = None  #: reads lines and faces from other programs
     library: str = ""  #: module that must be installed
     extra: str = ""  #: of pyproject.toml, which brings it
     reads_with: str = ""  #: module that must be installed to read; its extra is `extra`
@@ -237,7 +237,7 @@ def write(
     cloud : PointCloud, optional
         The scan, drawn in pictures.
     style : FileStyle, optional
-        Choices that formats leave: views and size of a picture, faces or lines in OBJ, decimal comma in CSV, bodies in IFC.
+        Choices that formats leave open: views and size of a picture, faces or lines in OBJ, decimal comma in CSV, bodies in IFC.
     report : StructureReport, optional
         Of a Solution: the utilization of its members.
 
@@ -268,15 +268,15 @@ def read_model(path: str | Path, merge: float | None = None) -> Model:
     Parameters
     ----------
     path : str or Path
-        A .json that `scantruss grid` or `scantruss structure` wrote, of which a structure with load cases is solved again; or lines
-        and faces that others drew: .obj, .ply, .dxf, .3dm, .ifc, .compas.json. The notes of the model say what is to be known of these.
+        A .json that `scantruss grid` or `scantruss structure` wrote (a structure with load cases is solved again), or lines and faces
+        from another program: .obj, .ply, .dxf, .3dm, .ifc, .compas.json. The notes of the model say what was found in these.
     merge : float, optional
-        Distance within which ends of such lines are one node; by default a thousandth of their median length.
+        Ends of such lines closer than this become one node; by default a thousandth of their median length.
 
     Raises
     ------
     FormatError
-        Unknown suffix, an extra that is not installed, or the file cannot be read or is no grid.
+        Unknown suffix, an extra that is not installed, the file cannot be read, or it is not a grid.
     """
     path = Path(path)
     known = {suffix: row for suffix, row in FORMATS.items() if row.read or row.draw}

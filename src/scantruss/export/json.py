@@ -132,7 +132,7 @@ def read_grid(path: str | Path) -> Grid:
     Raises
     ------
     FormatError
-        The file cannot be read, or it is not a grid of ours.
+        The file cannot be read, or it is not one of our grids.
     """
     try:
         values = json.loads(Path(path).read_text(encoding="utf-8"), parse_constant=_refuse_constant)

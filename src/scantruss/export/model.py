@@ -35,7 +35,7 @@ SYSTEM_CODE = re.compile(r"EPSG:\d{4,6}")
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """A grid or a structure as other programs take it; all lengths are in `unit`, up is z."""
+    """A grid or a structure as other programs need it; all lengths are in `unit`, up is z."""
 
     local: np.ndarray  #: (V, 3) float64, the nodes relative to `origin`
     origin: np.ndarray  #: (3,) float64, in the frame of the scan

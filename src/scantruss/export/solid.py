@@ -53,7 +53,7 @@ def print_model(
     marks : bool
         Engrave the mark of each node on its ball.
     keep_failed : bool
-        Print a grid that failed its certificate too.
+        Print a grid even if it failed its certificate.
 
     Returns
     -------
@@ -63,7 +63,7 @@ def print_model(
     Raises
     ------
     InputError
-        Diameters that do not suit the grid.
+        The diameters do not suit the grid.
     CertificateError
         The grid failed its certificate.
     FormatError

@@ -94,7 +94,7 @@ class PointCloud:
         return measure_gap(self.points)
 
     def show(self) -> Any:
-        """Return the scan as a view that a notebook shows: turn it, come nearer; nothing is loaded."""
+        """Return the scan as a view for a notebook: turn it, zoom; nothing is loaded from the network."""
         return import_module("scantruss.export.page").view_of_cloud(self)  # a layer above this one
 
     @classmethod

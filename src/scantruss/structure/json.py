@@ -154,7 +154,7 @@ def read_structure(path: str | Path) -> Truss:
     Raises
     ------
     FormatError
-        The file cannot be read, or it is not a structure of ours.
+        The file cannot be read, or it is not one of our structures.
     """
     return read_checked(path)[0]
 
@@ -165,7 +165,7 @@ def read_checked(path: str | Path) -> tuple[Truss, tuple[np.ndarray, tuple[str, 
     Raises
     ------
     FormatError
-        The file cannot be read, or it is not a structure of ours.
+        The file cannot be read, or it is not one of our structures.
     """
     try:
         values = json.loads(Path(path).read_text(encoding="utf-8"))

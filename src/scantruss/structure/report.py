@@ -135,19 +135,19 @@ def report_structure(
     Parameters
     ----------
     solution : Solution
-        Of `solve`.
+        Result of `solve`.
     checks : MemberChecks, optional
         Buckling length, partial factors, limits.
     notes : sequence of str
-        Warnings of whoever made the structure.
+        Further warnings, of whoever made the structure.
     buckling, vibration : Modes, optional
-        Of `worst_buckling` and `vibration_modes`.
+        Results of `worst_buckling` and `vibration_modes`.
     rounds : sequence of SizingRound
-        Of `size_members`.
+        Those of `size_members`.
     weights : dict of int to float, optional
-        Of `weight_curve`.
+        That of `weight_curve`.
     path : Path, optional
-        Of `solve_path`.
+        That of `solve_path`.
     """
     truss, checks = solution.truss, checks or MemberChecks()
     strength = strengths(truss, checks)

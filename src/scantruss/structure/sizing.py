@@ -84,14 +84,14 @@ def size_members(
     All members begin with the lightest section. Each round solves the structure and gives every member the lightest section
     that resists its forces, never a lighter one than before; then the sections are made few, at the least mass, by heavier
     ones. Once all pass, the lightest sections grow until the structure buckles at no less than the factor of the checks (EN 1993-1-1
-    5.2.1(3)). Fewer sections are taken where they are lighter, as they may be where buckling decides.
+    5.2.1(3)). Fewer sections are used if they are lighter, as they may be if buckling decides.
 
     Parameters
     ----------
     truss : Truss
         Its first section gives the kind.
     count : int
-        Different sections at most.
+        Most different sections.
     checks : MemberChecks, optional
         Buckling length, partial factors.
     rounds : list of SizingRound, optional

@@ -128,7 +128,7 @@ def solve(truss: Truss, factored: Factored | None = None) -> Solution:
     truss : Truss
         With supports and load cases.
     factored : Factored, optional
-        Its stiffness, where it has been factored already.
+        Its stiffness, if it has been factored already.
 
     Raises
     ------

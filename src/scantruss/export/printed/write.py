@@ -64,17 +64,17 @@ def print_parts(
     scale : float
         Size of the model over the size of the grid.
     bed : (width, depth, height), optional
-        Of the printer; parts lie on it in shelves, a file for each plate [unit of the grid].
+        Size of the printer's bed; parts lie on it in rows, a file for each plate [unit of the grid].
     sockets : bool
         A ball for each node, with sockets for rods, in place of a model cut into parts.
     clearance : float, optional
-        Between peg or rod and socket, all around; 0.15 members [unit of the grid].
+        Gap between a peg or rod and its socket, all around; by default 0.15 members [unit of the grid].
     sides : int
         Sides of a member.
     marks : bool
         Engrave the mark of each node on its ball.
     keep_failed : bool
-        Print a grid that failed its certificate too.
+        Print a grid even if it failed its certificate.
 
     Raises
     ------

@@ -55,7 +55,7 @@ def clean_points(
     unit: str = "",
     progress: Progress | None = None,
 ) -> CleanCloud:
-    """Return a clean scan; every step can be switched off by None or False.
+    """Return a clean scan; None or False switches a step off.
 
     Parameters
     ----------

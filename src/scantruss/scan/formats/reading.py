@@ -45,7 +45,7 @@ class Part:
 
 
 def read_points(path: FileNames, unit: str = "", selection: Selection | None = None) -> PointCloud:
-    """Return the points of a scan; the format is that of the suffix.
+    """Return the points of a scan; the suffix decides the format.
 
     Parameters
     ----------
@@ -55,14 +55,13 @@ def read_points(path: FileNames, unit: str = "", selection: Selection | None = N
     unit : str
         Unit of the coordinates: mm, cm, m, inch, foot, or "" for what the file says.
     selection : Selection, optional
-        Which points are taken; all by default.
+        Which points are kept; all by default.
 
     Returns
     -------
     PointCloud
-        All points that are taken, in the order of the files, with their normals where all files have them or have faces; colours
-        and other properties are left aside.
-        `notes` says what was left out or converted.
+        All points that are kept, in the order of the files, with normals if all files have normals or faces; colours and other
+        properties are ignored. `notes` says what was left out or converted.
 
     Raises
     ------
