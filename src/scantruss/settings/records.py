@@ -83,7 +83,7 @@ class MemberSettings(_Checked):
 
     length: float = _setting(
         0.0,
-        "desired member length; of a length field the shortest: the whole field is scaled to it",
+        "desired member length; with a length field, its shortest length, to which the field is scaled",
         symbol="l_e",
         unit="scan unit",
         source="Eq. 10",
