@@ -1,4 +1,4 @@
-"""The settings of each stage: every number that steers the method, with its symbol, unit, bounds, default and source.
+"""The settings of each stage: everything that can be set, with its symbol, unit, bounds, default and source.
 
 The options of the command line, the table in the docs and the JSON saved with each result are made from these fields.
 """
