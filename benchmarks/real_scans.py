@@ -79,15 +79,15 @@ SCANS = (
 WEAKEST = (
     "The vase gets members of a seventh of its height, because no shorter length that `info` tries passes. Lip and handle are"
     " rounded off, as they lie within half a member of the grid.",
-    "The figure with thin limbs passes because slits are filled and hands cut off, which is said: its feet grow into one. With members"
-    " of 0.0394 it keeps them apart.",
+    "The figure with thin limbs passes because slits are filled and hands cut off, which the result reports: its feet grow into one."
+    " With members of 0.0394 it keeps them apart.",
     "The range scans of the bunny have rims with notches and bridged gaps, where the scanner saw little; a front paw is a piece by"
     " itself, or left out.",
 )
 HEAD = """\
 # Real scans
 
-Each scan at the length that `scantruss info` suggests and at 1.4 times that, by `scantruss grid` with no other setting than is told.
+Each scan at the length that `scantruss info` suggests and at 1.4 times that, by `scantruss grid` with no other settings than those named.
 *Lost*: what the grid leaves out of the scan, and why, from its certificate. *95 %*: how far from the grid 95 % of the points lie at most,
 in members. In the pictures what is left out is coloured. The scans are not part of ScanTruss; their sources are named. Written by
 `python -m benchmarks.real_scans`."""

@@ -31,7 +31,7 @@ SIDES = (32, 45, 71, 100, 141)  #: 1,024 to 19,881 nodes
 GROWTH_AIM = 1.3  #: exponent of time over nodes
 LONG_PATH = 30
 NOTE = """\
-A shallow dome of tubes over a square, its boundary held, half the snow in one direction a case. Seconds of the processor, all threads,
+A shallow dome of tubes over a square, its boundary supported, half the snow in one direction a case. Seconds of the processor, all threads,
 of the analysis alone: the models stand ready. Medians, the smallest of two for PyNite, the path and the growth, in turn in one process.
 The exponent of the growth is that of least squares over logarithms."""
 

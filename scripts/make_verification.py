@@ -140,14 +140,14 @@ def _statics() -> Iterator[Proof]:
     warm = LoadCase("warm", temperature=np.array([30.0]))
     settled_, warm_ = solve(make_truss([(0, 0, 0), (4.0, 0, 0)], [(0, 1)], {0: HELD, 1: HELD}, settled, warm)).cases
     yield Proof(
-        "held beam 4 m, an end settles 10 mm: end moment",
+        "fixed beam 4 m, an end settles 10 mm: end moment",
         "Nm",
         "slope-deflection: 6 E I d / L2",
         6 * EI * 0.01 / 16,
         abs(settled_.reactions[0, 4]),
     )
     yield Proof(
-        "held bar, 30 K warmer: force",
+        "fixed bar, 30 K warmer: force",
         "kN",
         "Hooke: E A alpha T",
         -EA * 12e-6 * 30 / 1e3,
@@ -169,10 +169,10 @@ def _stability() -> Iterator[Proof]:
     members = np.stack([np.arange(count), np.arange(1, count + 1)], axis=1)
     top = (np.inf, np.inf, 0.0, 0.0, 0.0, np.inf)
     ends = {
-        "held at its foot": (2.0, HELD, FREE),
+        "fixed at its foot": (2.0, HELD, FREE),
         "hinged at both ends": (1.0, (*HINGED[:5], np.inf), top),
-        "held and hinged": (0.699157, HELD, top),
-        "held at both ends": (0.5, HELD, (np.inf, np.inf, 0.0, np.inf, np.inf, np.inf)),
+        "fixed and hinged": (0.699157, HELD, top),
+        "fixed at both ends": (0.5, HELD, (np.inf, np.inf, 0.0, np.inf, np.inf, np.inf)),
     }
     for name, (share, foot, head) in ends.items():
         truss = make_truss(nodes, members, {0: foot, count: head}, forces(count + 1, {count: (0, 0, -1000.0)}))
@@ -213,7 +213,7 @@ def _paths() -> Iterator[Proof]:
     yield Proof("two pinned bars 10 x 0.5 m: limit", "kN", reference, limit, path.limit_factor or 0.0, 1e-5)
     path = perfect(williams(), stop_factor=1.2)
     yield Proof(
-        "toggle of two held members: limit", "lb", "Williams 1964", 34.0, 34.0 * (path.limit_factor or 0.0), 5e-3
+        "toggle of two fixed members: limit", "lb", "Williams 1964", 34.0, 34.0 * (path.limit_factor or 0.0), 5e-3
     )
     load, down, away = elastica(1.0)
     nodes, members = (
@@ -318,7 +318,7 @@ def _shells() -> Iterator[Proof]:
                 [getattr(model.nodes[mark], way)[case.name] for way in ("DX", "DY", "DZ")] for mark in truss.node_marks
             ]
             axial = np.array([-model.members[mark].axial(0, case.name) for mark in truss.member_marks])
-            what = f"shell of {len(truss.members)} members, {supports} held, {case.name}"
+            what = f"shell of {len(truss.members)} members, {supports} supported, {case.name}"
             yield Proof(
                 f"{what}: greatest displacement",
                 "mm",

@@ -19,7 +19,7 @@ FACE = 4.0  #: least width of a face, but where folds meet in one place [member]
 NODES = 300, 3000  #: of the grid, about
 PER_NODE = np.sqrt(3) / 2  #: area for a node [member squared]
 SPACING_NOISE, MEMBER_NOISE = 0.15, 0.06  #: most noise [spacing], [member]
-LOWER = 3.0  #: how far an open body goes on below its rim before it is cut [member]
+LOWER = 3.0  #: how far an open body goes on below its boundary before it is cut [member]
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +28,7 @@ class Form:
 
     area: float
     face: float  #: width of its narrowest face
-    loops: list[Floats]  #: dense rims, (K, 3) each
+    loops: list[Floats]  #: dense boundaries, (K, 3) each
     distance: Callable[[Floats], Floats]
     sample: Callable[[np.random.Generator, float], Floats]  #: points of a density [1 / member squared]
 
@@ -94,7 +94,7 @@ class Relief:
         return np.asarray(there & (crossings % 2 == 1))
 
     def rims(self) -> list[Floats]:
-        """The rims in the plan, dense, (K, 2) each."""
+        """The boundaries in the plan, dense, (K, 2) each."""
         share = np.linspace(0, 1, 100, endpoint=False)[:, None]
         pairs = zip(self.outline, np.roll(self.outline, -1, axis=0), strict=True)
         found = [self.size * np.concatenate([a + share * (b - a) for a, b in pairs])]
@@ -306,7 +306,7 @@ def cone(rng: np.random.Generator) -> Turned:
 
 @dataclass(frozen=True, eq=False)
 class Body:
-    """A convex body; open: without what lies below the height 0, so that its walls end in a rim there."""
+    """A convex body; open: without what lies below the height 0, so that its walls end in a boundary there."""
 
     corners: Floats  #: (K, 3)
     face: float

@@ -35,12 +35,12 @@ def noisy(seed: int) -> Shape:
 
 
 def strays(seed: int) -> Shape:
-    """A tenth of strays in the box around the shape."""
+    """A tenth of outliers in the box around the shape."""
     return _smooth(seed, 40_000, outliers=0.1)
 
 
 def flat_strays(seed: int) -> Shape:
-    """Flat ground with a tenth of strays in its flat box."""
+    """Flat ground with a tenth of outliers in its flat box."""
     return make(("terrain", "flat_plate", "cloth")[seed % 3], 30_000, outliers=0.1, seed=seed)
 
 
@@ -166,7 +166,7 @@ def rough_ground(seed: int) -> Shape:
 
 
 def zigzag(seed: int) -> Shape:
-    """A rim with thousands of zigzags finer than a member."""
+    """A boundary with thousands of zigzags finer than a member."""
     depth, wide = ((0.3, 0.08), (0.5, 0.15), (0.8, 0.3))[seed % 3]
     length, radius = 3.0, 45.0
     count = 4 * int(2 * np.pi * radius / (wide * length) / 2)

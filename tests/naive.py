@@ -16,7 +16,7 @@ def within(positions: ArrayLike, place: ArrayLike, reach: float) -> list[int]:
 
 
 def thin(points: np.ndarray, radius: float) -> list[int]:
-    """Points that become sites: each that has no earlier site nearer than `radius`."""
+    """Points that become samples: each that has no earlier sample nearer than `radius`."""
     chosen: list[int] = []
     for p, place in enumerate(points):
         if not chosen or ((points[chosen] - place) ** 2).sum(axis=1).min() >= radius * radius:
@@ -37,7 +37,7 @@ def plane_normal(points: np.ndarray) -> np.ndarray:
 
 
 def reachable(neighbors: np.ndarray, mean: np.ndarray, sample: int, place: np.ndarray, reach: float) -> set[int]:
-    """Sites linked to one site over sites within `reach` of a place; the first one counts wherever it is."""
+    """Samples linked to one sample over samples within `reach` of a place; the first one counts wherever it is."""
     inside = np.linalg.norm(mean - place, axis=1) <= reach
     found, waiting = {sample}, [sample]
     while waiting:

@@ -1,7 +1,7 @@
-"""Random surfaces with known topology: smooth heights over smooth outlines with concave rims and holes, any pose and unit.
+"""Random surfaces with known topology: smooth heights over smooth outlines with concave boundaries and holes, any pose and unit.
 
 `random_surface(seed)` gives the points and the truth, all in the frame of the points. What it asks for can be had: nothing is
-narrower than three members, no hole has a rim shorter than six, the surface bends at two members or more.
+narrower than three members, no hole has a boundary shorter than six, the surface bends at two members or more.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ class RandomSurface:
     points: Floats  #: (N, 3)
     length: float  #: member [scan unit]
     noise: float  #: standard deviation of each coordinate [scan unit]
-    loops: list[Floats]  #: dense true rims, (K, 3) each, the outer one first
+    loops: list[Floats]  #: dense true boundaries, (K, 3) each, the outer one first
     distance: Callable[[Floats], Floats]  #: of positions (K, 3) to the true surface, (K,)
     facts: dict[str, float]  #: what was drawn, in members
     components: int = 1
     known_loops: bool = True
-    corners: Floats = field(default_factory=lambda: np.zeros((0, 3)))  #: no rim has any
+    corners: Floats = field(default_factory=lambda: np.zeros((0, 3)))  #: no boundary has any
 
     @property
     def euler(self) -> int:
@@ -117,7 +117,7 @@ def inside(ring: Callable[[Floats], Floats], middle: Floats, xy: Floats) -> Any:
 
 
 def random_outline(rng: np.random.Generator, radius: float, heights: Heights) -> Callable[[Floats], Floats]:
-    """Return an outer rim no part of which is narrower than NECK, ever rounder until that holds."""
+    """Return an outer boundary no part of which is narrower than NECK, ever rounder until that holds."""
     strength = rng.uniform(0.1, 1.1)
     while True:
         ring = random_ring(rng, radius, 5, strength)

@@ -178,7 +178,7 @@ def valve_vertices() -> Truth:
 
 
 def mask() -> Truth:
-    """Return a face-like mask as mesh vertices with a steep margin and a ragged rim."""
+    """Return a face-like mask as mesh vertices with a steep margin and a ragged boundary."""
     ragged = _wavy(11, ((0.9, 0.02), (0.25, 0.015)))
 
     def radius(t: Floats) -> Floats:
@@ -195,7 +195,7 @@ def mask() -> Truth:
 
 
 def hillside() -> Truth:
-    """Return lidar ground: rough, an irregular ragged rim with bays, two strips of uneven density."""
+    """Return lidar ground: rough, an irregular ragged boundary with bays, two strips of uneven density."""
     ragged = _wavy(21, ((2.0, 0.16), (0.5, 0.04), (0.12, 0.012)))
     mesh = _wavy(22, ((260, 16), (90, 5), (30, 1.0), (13, 0.35)))
 
@@ -228,7 +228,7 @@ def wooded_hillside() -> Truth:
 
 
 def quarry() -> Truth:
-    """Return ground with a steep wall, a bay in the rim and two inner gaps without points."""
+    """Return ground with a steep wall, a bay in the boundary and two inner gaps without points."""
     mesh = _wavy(31, ((200, 10), (60, 3)))
 
     def z(x: Floats, y: Floats) -> Floats:
@@ -249,7 +249,7 @@ def quarry() -> Truth:
 
 
 def view() -> Truth:
-    """Return what a scanner sees of the figure from one side: ragged rim, shadow gaps, no known number of loops."""
+    """Return what a scanner sees of the figure from one side: ragged boundary, shadow gaps, no known number of loops."""
     figure = statuette()
     body: Surface = figure.pieces[0]
     assert body.project is not None

@@ -46,7 +46,7 @@ class Shape:
 
     @property
     def loops(self) -> list[Floats]:
-        """Dense true rims, (K, 3) each."""
+        """Dense true boundaries, (K, 3) each."""
         return self.surface.loops
 
     @property
@@ -110,7 +110,7 @@ def _apart(positions: Floats, radius: Floats) -> Floats:
 
 
 def _vertices(truth: Truth, surface: Surface, count: int, rng: np.random.Generator) -> Floats:
-    """Return about `count` positions as the vertices of a mesh lie, unevenly large, with its rim."""
+    """Return about `count` positions as the vertices of a mesh lie, unevenly large, with its boundary."""
     assert truth.spread is not None
     candidates = np.concatenate(
         [*(rng.permutation(loop) for loop in surface.loops), _sample(truth, 8 * count, rng, None)]
@@ -171,7 +171,7 @@ def sampled(
     scale, offset
         Positions become scale * position + offset, after the pose; the truth goes with them.
     even : bool
-        Points lie somewhat more evenly than by chance; False: by chance.
+        Points lie somewhat more evenly than at random; False: at random.
     density_ratio : float
         Points lie this much denser at one end than at the other.
     outliers, duplicates : float

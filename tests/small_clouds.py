@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from scantruss import PointCloud, Settings
-from scantruss.front.advance import new_front
+from scantruss.front.start import new_front
 from scantruss.kernels.front import front as lists
 from scantruss.kernels.front.fits import near_nodes
 from scantruss.kernels.surface.local_surface import PATCH_COLUMNS
@@ -22,7 +22,7 @@ def sheet(
     noise: float = 0.0,
     seed: int = 0,
 ) -> np.ndarray:
-    """Points of a plate [-width/2, width/2] x [-depth/2, depth/2], on a jittered lattice that reaches the rim."""
+    """Points of a plate [-width/2, width/2] x [-depth/2, depth/2], on a jittered lattice that reaches the boundary."""
     rng = np.random.default_rng(seed)
     x, y = (np.linspace(-e / 2, e / 2, round(e / spacing) + 1) for e in (width, depth))
     u, v = (a.ravel() for a in np.meshgrid(x, y))
@@ -35,7 +35,7 @@ def sheet(
 
 
 def ring(inner: float, outer: float, spacing: float, *, seed: int = 0) -> np.ndarray:
-    """Points between two circles, both rims dense; `inner` 0 gives a disc."""
+    """Points between two circles, both boundaries dense; `inner` 0 gives a disc."""
     body = sheet(2 * outer, 2 * outer, spacing, seed=seed)
     away = np.hypot(body[:, 0], body[:, 1])
     parts = [body[(away < outer - 0.5 * spacing) & (away > inner + (0.5 * spacing if inner else -1))]]
@@ -67,7 +67,7 @@ def tire(radius: float, tube: float, spacing: float, *, seed: int = 0) -> np.nda
 
 
 def cap(radius: float, opening: float, spacing: float, *, seed: int = 0) -> np.ndarray:
-    """Points of a dome around z, down to `opening` [radian] from its top, its rim dense."""
+    """Points of a dome around z, down to `opening` [radian] from its top, its boundary dense."""
     flat = ring(0.0, radius * opening, spacing, seed=seed)
     away = np.maximum(np.hypot(flat[:, 0], flat[:, 1]), 1e-12)
     side = radius * np.sin(away / radius) / away

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from scantruss.structure.catalogue import Section, find_material, find_section
-from scantruss.structure.statics import CaseResult
+from scantruss.structure.results import CaseResult
 from scantruss.structure.truss import LoadCase, Truss
 
 TUBE, STEEL = find_section("CHS114.3x5"), find_material("S355")

@@ -77,7 +77,7 @@ def test_a_net_of_right_triangles_has_the_figures_known_by_hand() -> None:
 
 def test_a_net_that_lies_off_is_seen_in_deviation_rim_and_cover() -> None:
     shape = replace(make("flat_plate", 20_000), length=2.0)
-    nodes, triangles = plate_net(20, 20, ((-30.0, -20.0), (10.0, 20.0)))  # ends 20 before the rim of x = 30
+    nodes, triangles = plate_net(20, 20, ((-30.0, -20.0), (10.0, 20.0)))  # ends 20 before the boundary of x = 30
     found = figures.figures(shape, nodes + [0, 0, 0.5], triangles)
     assert found.deviation == pytest.approx(0.25) and found.deviation_max == pytest.approx(0.25)
     assert found.boundary == pytest.approx(np.hypot(20, 0.5) / 2, rel=1e-3)

@@ -1,4 +1,4 @@
-"""Boundary loops of clouds whose rim is known: number, length, side, corners, nodes (Sec. 3.3)."""
+"""Boundary loops of clouds whose boundary is known: number, length, side, corners, nodes (Sec. 3.3)."""
 
 from typing import Any, Never
 
@@ -30,7 +30,7 @@ RHOMBUS = [(-6, 0), (0, -6 * 3**0.5 / 3), (6, 0), (0, 6 * 3**0.5 / 3)]  # 60 and
 
 
 def polygon(corners: ArrayLike, spacing: float = 0.12, seed: int = 0) -> np.ndarray:
-    """Points of a plate over a polygon, its rim dense."""
+    """Points of a plate over a polygon, its boundary dense."""
     corners = np.array(corners, float)
     after = np.roll(corners, -1, axis=0)
     body = sheet(14, 14, spacing, seed=seed)[:, :2]
@@ -149,7 +149,7 @@ def test_external_boundaries_run_anticlockwise_internal_ones_clockwise() -> None
 
 @pytest.mark.parametrize("radius", [1.0, 1.5])
 def test_holes_shorter_than_the_smallest_are_closed_over(radius: float) -> None:
-    """A rim of 2 pi r counts from `fill_holes` on."""
+    """A boundary of 2 pi r counts from `fill_holes` on."""
     around = 2 * np.pi * radius
     points = ring(radius, 6.0, 0.12)
     assert len(found(points, fill_holes=0.85 * around)[0].internal) == 1
@@ -240,7 +240,7 @@ def test_boundary_points_do_not_go_back_and_forth() -> None:
 
 @pytest.mark.parametrize("seed", [1, 4, 8, 10])
 def test_the_rim_of_a_sparse_scan_does_not_run_back_on_itself(seed: int) -> None:
-    """With ten points for a node the disc touches some in another order than they have along the rim."""
+    """With ten points for a node the disc touches some in another order than they have along the boundary."""
     shape = make("great_court", 20_000, seed=seed)
     length = float(np.sqrt(4 / np.sqrt(3) * shape.area / 2 / 2_000))
     for loop in found(shape.points, length)[0].loops:
@@ -266,7 +266,7 @@ def test_the_rim_for_the_kernels_is_made_of_the_loops() -> None:
 
 
 def test_corners_follow_the_angle_that_is_asked() -> None:
-    """The rim of a rhombus turns by 120 degrees at two corners and by 60 at the others."""
+    """The boundary of a rhombus turns by 120 degrees at two corners and by 60 at the others."""
     points = polygon(RHOMBUS)
     assert [len(found(points, corner_angle=angle)[0].corners) for angle in (40.0, 90.0, 150.0)] == [4, 2, 0]
 
@@ -336,7 +336,7 @@ def test_progress_is_reported_and_may_stop_the_search() -> None:
 
 @pytest.mark.parametrize("seed", range(4))
 def test_a_disc_that_is_caught_on_its_way_rolls_the_other_way_round(seed: int) -> None:
-    """The rim of what is seen from one side is over a hundred members long; rolled one way only, the disc never comes round.
+    """The boundary of what is seen from one side is over a hundred members long; rolled one way only, the disc never comes round.
 
     There is one hole, and a bay whose mouth is about as wide as the disc: with seed 2 it is closed, a second hole.
     """

@@ -244,7 +244,7 @@ def test_irregular_nodes_are_counted_as_stated(grid: st.Grid, expected: tuple[in
 
 @pytest.mark.parametrize("name", ["sphere", "two_holes"])
 def test_what_is_forced_follows_from_euler_number_and_rim(name: str) -> None:
-    """6 * Euler number - sum over the rim (3 - k), whatever the grid inside; a sphere has twelve."""
+    """6 * Euler number - sum over the boundary (3 - k), whatever the grid inside; a sphere has twelve."""
     shape = make(name, 12_000)
     grid = st.grid_from_points(shape.points, st.Settings(length=2 * shape.length))
     present, forced = known(grid.certificate).irregular, known(grid.certificate).irregular_forced

@@ -108,7 +108,7 @@ def test_noise_falls_to_a_third_and_the_rim_stays(name: str) -> None:
     if shape.loops:
         rim = cKDTree(np.concatenate(shape.loops)).query(before)[0] < spacing
         assert rim.sum() > 100 and np.quantile(moved[rim], 0.999) <= spacing
-        ends = np.concatenate(shape.loops)  # every part of the true rim has a clean point as near as before
+        ends = np.concatenate(shape.loops)  # every part of the true boundary has a clean point as near as before
         gone = cKDTree(points).query(ends)[0] - cKDTree(before).query(ends)[0]
         assert gone.max() <= spacing
 

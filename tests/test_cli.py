@@ -124,7 +124,7 @@ def refused(capsys: pytest.CaptureFixture[str], *words: Any, status: int = 2) ->
         ),
         (
             "clean scan.xyz a.xyz --spacing 20mm",
-            "--spacing: needs a number without mm, got 20mm; --help tells its unit",
+            "--spacing: needs a number without mm, got 20mm; --help names its unit",
         ),
         ("grid scan.xyz a.obj --length 4 --boundary no.csv", "cannot read boundaries no.csv"),
         ("grid scan.xyz a.obj --lenght 4", "unknown option --lenght (did you mean --length?)"),

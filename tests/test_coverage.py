@@ -24,7 +24,7 @@ pytestmark = pytest.mark.kernels
 @settings(max_examples=20)
 @given(some.integers(0, 10_000), some.sampled_from([0.0, 0.05, 1.0, 20.0]))
 def test_the_nearest_of_all_triangles_is_found(seed: int, away: float) -> None:
-    """On the grid, near it and far from it; places beyond its rim too."""
+    """On the grid, near it and far from it; places beyond its boundary too."""
     rng = np.random.default_rng(seed)
     grid, length = dome(5), 4.0
     corners = grid.nodes[grid.triangles]

@@ -15,7 +15,7 @@ from typed import known
 import scantruss as st
 from scantruss.constraints.embedded_lines import add_half_edges, check_links, link_around
 from scantruss.errors import FrontError
-from scantruss.front import advance as driver
+from scantruss.front.start import new_front, start_front
 from scantruss.kernels.front import advance as kernels
 from scantruss.kernels.front import front as lists
 from scantruss.kernels.front import gaps
@@ -58,7 +58,7 @@ def initial_front(name: str) -> tuple[Front, SurfaceSamples, st.Settings]:
     settings = st.Settings(length=length)
     samples, boundary, constraints = steps_of(st.PointCloud.from_array(points()), settings)
     return (
-        driver.start_front(driver.new_front(samples, settings), samples, boundary, constraints, settings),
+        start_front(new_front(samples, settings), samples, boundary, constraints, settings),
         samples,
         settings,
     )
@@ -161,7 +161,7 @@ def add_lines_from(front: Front, node: int, places: Iterable[int]) -> None:
 
 @given(strategies.lists(strategies.integers(0, 23), min_size=1, max_size=6), strategies.booleans())
 def test_lines_in_any_directions_leave_closed_loops(turns: list[int], on_boundary: bool) -> None:
-    """Lines from one node: several in one direction, some of them across the rim."""
+    """Lines from one node: several in one direction, some of them across the boundary."""
     hand = HandFront([(0.0, 0.0), (3.0, 0.0), (3.0, 3.0), (0.0, 3.0)], points=PLATE)
     x, y = (0.0, 0.0) if on_boundary else (1.5, 1.5)
     node = 0 if on_boundary else hand.add_node(x, y)
@@ -178,7 +178,7 @@ def test_lines_in_any_directions_leave_closed_loops(turns: list[int], on_boundar
 
 @given(strategies.lists(strategies.integers(1, 11), min_size=1, max_size=5, unique=True))
 def test_the_rim_goes_out_and_back_along_each_line_in_the_order_in_which_they_stand(turns: list[int]) -> None:
-    """What comes along the rim turns into the line that is nearest, back from it into the next, and goes on along the rim."""
+    """What comes along the boundary turns into the line that is nearest, back from it into the next, and goes on along the boundary."""
     hand = HandFront([(0.0, 0.0), (3.0, 0.0), (3.0, 3.0), (-3.0, 0.0)], points=PLATE)
     front, rim = hand.front, hand.segments[0]
     ends = {turn: hand.add_node(np.cos(turn * np.pi / 12), np.sin(turn * np.pi / 12)) for turn in turns}

@@ -1,4 +1,4 @@
-"""Equalizing: one energy that falls, members of one length, a topology that stays; curves on which the rim slides."""
+"""Equalizing: one energy that falls, members of one length, a topology that stays; curves on which the boundary slides."""
 
 from collections.abc import Callable
 

@@ -107,7 +107,7 @@ def test_crossing_lines_share_a_node_and_corners_are_nodes() -> None:
     assert np.linalg.norm(nodes[list(counts)] - corner, axis=1).min() < 0.02
     assert (
         min(np.linalg.norm(nodes[n][:2] - [-1, -4.2]) for n, c in counts.items() if c == 1) < 0.02
-    )  # far from the rim
+    )  # far from the boundary
 
 
 def test_a_closed_line_is_a_ring_also_on_a_closed_scan() -> None:
@@ -404,7 +404,7 @@ def test_the_network_cuts_lines_where_they_meet() -> None:
 
     add((0, 5), (10, 5))
     add((5, 2), (5, 8))
-    add((3, 5.2), (3, 9.8))  # touches the first, comes near the rim
+    add((3, 5.2), (3, 9.8))  # touches the first, comes near the boundary
     add((7, 8), (7, 4.8))  # goes a little over it
     add((1, 5.1), (9, 5.1))  # along it
     lines = network.lines()

@@ -119,7 +119,7 @@ def test_nothing_changes_at_a_defect(name: str) -> None:
 
 
 def slid(net: Net) -> Net:
-    """Every boundary node on one curve, all free to move: the moves of the rim become possible."""
+    """Every boundary node on one curve, all free to move: the moves of the boundary become possible."""
     net.kind[:] = net.is_open
     net.curve[:] = np.where(net.is_open == 1, 0, -1)
     return net

@@ -12,7 +12,7 @@ import scantruss as st
 @pytest.mark.parametrize("method", ["default", "paper"])
 @pytest.mark.parametrize("name", HARD)
 def test_topology_and_distance(name: str, method: str) -> None:
-    """Nodes off the rim lie within half the noise of the true surface on average (.003 members where there is hardly any)."""
+    """Nodes off the boundary lie within half the noise of the true surface on average (.003 members where there is hardly any)."""
     shape = hard(name, 0)
     settings = st.Settings(length=shape.length, effort="quick", method=method)
     if method == "paper":  # it merges nodes as they come and sets members no limits

@@ -18,7 +18,7 @@ from scantruss.boundary.holes import fill_holes
 from scantruss.grid.certificate import LeftOut
 from scantruss.report.figures import first_line, left_out_lines
 
-RADIUS = 15 / (2 * np.pi)  # of a hole with a rim of 15 members of length 1
+RADIUS = 15 / (2 * np.pi)  # of a hole with a boundary of 15 members of length 1
 
 
 def field(z: Callable[[np.ndarray, np.ndarray], np.ndarray], spacing: float = 0.16, noise: float = 0.002) -> np.ndarray:
@@ -97,7 +97,7 @@ def test_a_hole_longer_than_asked_keeps_its_loop_and_what_is_around_stays() -> N
 
 
 def test_the_outer_rim_of_a_small_piece_is_no_hole() -> None:
-    """A patch whose rim is shorter than the holes that are closed stays what it is; a nearly closed ball closes."""
+    """A patch whose boundary is shorter than the holes that are closed stays what it is; a nearly closed ball closes."""
     patch = st.PointCloud.from_array(sheet(5, 5, 0.12))
     assert len(boundary_of(patch, st.Settings(length=1.0, fill_holes=30.0)).loops) == 1
     points, _ = opened("sphere")
@@ -106,7 +106,7 @@ def test_the_outer_rim_of_a_small_piece_is_no_hole() -> None:
 
 @pytest.mark.parametrize("reach", [40, 100])
 def test_a_hole_around_a_bend_is_filled(reach: int) -> None:
-    """On a tube: as the rim leaves its plane the hole is drawn as a circle."""
+    """On a tube: as the boundary leaves its plane the hole is drawn as a circle."""
     rng = np.random.default_rng(0)
     turn, z = rng.uniform(-np.pi, np.pi, 30_000), rng.uniform(-10, 10, 30_000)
     points = np.column_stack([3 * np.cos(turn), 3 * np.sin(turn), z])

@@ -1,4 +1,4 @@
-"""A dense scan that is smooth has larger sites; one with a ridge, noise, strays or a second sheet near by has not."""
+"""A dense scan that is smooth has larger samples; one with a ridge, noise, outliers or a second sheet near by has not."""
 
 from itertools import product
 
@@ -19,7 +19,7 @@ from scantruss.surface.samples import SurfaceSamples, sample_surface, samples_wi
 
 
 def apart(samples: SurfaceSamples) -> float:
-    """How far apart the sites are: the smallest distance that they keep [member lengths]."""
+    """How far apart the samples are: the smallest distance that they keep [member lengths]."""
     return samples.surface.radius
 
 
@@ -86,7 +86,7 @@ def test_flatter_ridges_that_are_asked_for_are_seen() -> None:
 @settings(max_examples=10)
 @given(strategies.integers(0, 10_000), strategies.floats(2.0, 60.0))
 def test_uneven_sites_are_those_of_a_plain_loop(seed: int, angle: float) -> None:
-    """The normal of a neighbour, mirrored at the plane half-way, against that of the site; the sign of neither counts."""
+    """The normal of a neighbour, mirrored at the plane half-way, against that of the sample; the sign of neither counts."""
     rng = np.random.default_rng(seed)
     points = np.column_stack([rng.uniform(0, 3, (150, 2)), 0.1 * rng.normal(size=150)])
     found, least = link_samples(points, 0.3, 1.0, 0.2), float(np.cos(np.radians(angle)))
@@ -105,7 +105,7 @@ def test_uneven_sites_are_those_of_a_plain_loop(seed: int, angle: float) -> None
 
 @pytest.mark.parametrize("effort", ["quick", "normal"])
 def test_the_grid_of_larger_sites_lies_on_the_scan_as_that_of_the_usual_ones(effort: str) -> None:
-    """Noisy domes: the same topology; nodes no farther from the true sphere, rim nodes no farther from the true circle."""
+    """Noisy domes: the same topology; nodes no farther from the true sphere, boundary nodes no farther from the true circle."""
     dome, off, rim = cap(6.0, 0.9, 0.06), [], []
     for seed, size in product(range(3), (None, SAMPLE_SPACING)):
         points = dome + 0.01 * np.random.default_rng(seed).normal(size=dome.shape)
@@ -131,7 +131,7 @@ def test_places_find_the_site_nearest_to_them_from_any_near_by() -> None:
 
 
 def test_what_is_made_up_over_a_hole_leaves_the_rest_as_it_was_thinned() -> None:
-    """A dense plate; what is added is no smooth surface. All points near the rim are still found, and no larger sites tried."""
+    """A dense plate; what is added is no smooth surface. All points near the boundary are still found, and no larger samples tried."""
     cloud, settings = st.PointCloud.from_array(sheet(8, 8, 0.015)), st.Settings(length=1.0)
     samples = sample_surface(cloud, settings)
     assert samples.smooth and samples.whole is not None and len(samples.surface.points) < 0.1 * len(cloud.points)

@@ -44,7 +44,7 @@ def foot_of(surface: Surface, place: Iterable[float], sample: int | None = None)
 
 
 def inner_places(rng: np.random.Generator, width: float, count: int) -> np.ndarray:
-    """Places a little over or under the plane, away from the rim of a plate."""
+    """Places a little over or under the plane, away from the boundary of a plate."""
     return rng.uniform(-1, 1, (count, 3)) * [0.5 * width - 1.0, 0.5 * width - 1.0, 0.2]
 
 

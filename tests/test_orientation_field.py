@@ -160,7 +160,7 @@ def test_directions_of_neighbours_agree_but_at_a_few_singular_places(
     side = np.cross(posts.normals[a], posts.direction[a])
     turned = (np.cos(k * np.pi / 3) * posts.direction[a] + np.sin(k * np.pi / 3) * side for k in range(6))
     best = np.max([(way * other).sum(axis=1) for way in turned], axis=0)
-    assert (np.degrees(np.arccos(best.clip(-1, 1))) < 15.0).mean() > 0.85  # half of them would by chance
+    assert (np.degrees(np.arccos(best.clip(-1, 1))) < 15.0).mean() > 0.85  # half of them would at random
     assert abs((posts.direction * posts.normals).sum(axis=1)).max() < 1e-9
     assert np.linalg.norm(posts.direction, axis=1) == pytest.approx(1.0)
 
@@ -178,7 +178,7 @@ def test_every_site_has_a_post_within_reach_and_posts_keep_their_distance() -> N
         first = places[np.unique(owner, return_index=True)[1]]
         assert np.linalg.norm(places - first[owner], axis=1).max() < radius
         count = (posts.neighbors >= 0).sum(axis=1)
-        assert count.min() >= 1 and np.median(count) >= (5 if len(count) > 50 else 3)  # of few most lie at the rim
+        assert count.min() >= 1 and np.median(count) >= (5 if len(count) > 50 else 3)  # of few most lie at the boundary
         for p in range(len(posts.mean)):
             links = posts.neighbors[p, : count[p]].tolist()
             assert p not in links and len(set(links)) == len(links)

@@ -1,4 +1,4 @@
-"""Stray points are found, points of the surface are kept."""
+"""Outliers are found, points of the surface are kept."""
 
 from typing import Any, Never
 
@@ -19,7 +19,7 @@ from scantruss.surface.samples import sample_surface
 
 
 def marked(name: str, count: int, **options: Any) -> tuple[Shape, np.ndarray, float]:
-    """Return a cloud with a tenth of strays in its box, which of its points are true, and their spacing."""
+    """Return a cloud with a tenth of outliers in its box, which of its points are true, and their spacing."""
     shape = make(name, count, outliers=0.1, **options)
     true = {point.tobytes() for point in make(name, count, **options).points}
     is_true = np.array([point.tobytes() in true for point in shape.points])
@@ -46,7 +46,7 @@ def marked(name: str, count: int, **options: Any) -> tuple[Shape, np.ndarray, fl
 def test_of_a_tenth_of_strays_hardly_one_stays_and_hardly_a_point_of_the_surface_is_lost(
     name: str, options: dict[str, Any]
 ) -> None:
-    """Strays lie anywhere in the box enlarged by three tenths to all sides, those on the surface included."""
+    """Outliers lie anywhere in the box enlarged by three tenths to all sides, those on the surface included."""
     shape, is_true, spacing = marked(name, 30_000, **options)
     outlier = outliers.find_outliers(shape.points, 3.0)
     away = shape.distance(shape.points)
@@ -57,7 +57,7 @@ def test_of_a_tenth_of_strays_hardly_one_stays_and_hardly_a_point_of_the_surface
 
 @pytest.mark.parametrize("name", ["fold_over", "terrain", "flat_plate"])
 def test_strays_in_a_flat_box_are_left_out_but_for_those_on_the_surface(name: str) -> None:
-    """Here a good part of the strays lies on the surface itself, where nothing tells them; in the plate's case half of them.
+    """Here a good part of the outliers lies on the surface itself, where nothing shows them; in the plate's case half of them.
 
     The others of the plate lie in its own plane, a sparse surface: with other seeds between .91 and .97 of them are found.
     """

@@ -15,7 +15,7 @@ from steps import boundary_of, front_of, steps_of
 
 import scantruss as st
 from scantruss.boundary.find import characteristic_points
-from scantruss.front.advance import new_front, start_front
+from scantruss.front.start import new_front, start_front
 from scantruss.improve.flips import flip_edges
 from scantruss.kernels.front import cases, fits
 from scantruss.kernels.front import front as lists
@@ -48,7 +48,7 @@ def test_equation_1_a_box_is_larger_than_the_spacing_and_smaller_than_the_smalle
     cloud = st.PointCloud.from_array(sheet(5, 4, 0.2))
     size = sample_surface(cloud, settings).boxes.size
     assert cloud.spacing < size.max()
-    assert size.max() < settings.closed_boundary_length / math.pi  # the diameter of a hole with that rim
+    assert size.max() < settings.closed_boundary_length / math.pi  # the diameter of a hole with that boundary
 
 
 @pytest.mark.kernels

@@ -1,4 +1,4 @@
-"""Two halves of a grid: apart, complete, and the same whoever works on them."""
+"""Two parts of a grid: apart, complete, and the same whoever works on them."""
 
 from collections.abc import Callable, Iterable
 from typing import Any
@@ -10,7 +10,7 @@ from rough import Rough, rough_disc, rough_sphere, same_topology
 from scantruss.improve import equalize, perturbation
 from scantruss.improve.partition import Partition
 from scantruss.kernels.mesh.grid import Net
-from scantruss.kernels.mesh.partition import BETWEEN_HALVES
+from scantruss.kernels.mesh.partition import BETWEEN_PARTS
 from scantruss.runtime import parallel
 
 MAKERS: dict[str, Callable[[int], Rough]] = {
@@ -36,7 +36,7 @@ def ways(net: Net, start: Iterable[int]) -> dict[int, int]:
 
 @pytest.mark.kernels
 @pytest.mark.parametrize("seed", range(2))
-def test_two_rings_of_nodes_lie_between_the_halves(make: Callable[..., Rough], seed: int) -> None:
+def test_two_rings_of_nodes_lie_between_the_parts(make: Callable[..., Rough], seed: int) -> None:
     net = make(seed).mesh().net
     live = net.degree > 0
     partition = Partition(net, live)
@@ -44,7 +44,7 @@ def test_two_rings_of_nodes_lie_between_the_halves(make: Callable[..., Rough], s
     away = ways(net, first.tolist())
     assert min(away[v] for v in np.flatnonzero(live & (partition.label == 1)).tolist()) >= 3
     counts = [int((live & (partition.label == side)).sum()) for side in (0, 1)]
-    assert min(counts) > 0.3 * live.sum() and (live & (partition.label == BETWEEN_HALVES)).sum() < 0.3 * live.sum()
+    assert min(counts) > 0.3 * live.sum() and (live & (partition.label == BETWEEN_PARTS)).sum() < 0.3 * live.sum()
 
 
 @pytest.mark.kernels
@@ -60,16 +60,16 @@ def test_each_half_has_free_nodes_of_its_own_and_gives_them_back(make: Callable[
 
 
 @pytest.mark.kernels
-def test_a_grid_without_work_has_no_halves(make: Callable[..., Rough]) -> None:
+def test_a_grid_without_work_has_no_parts(make: Callable[..., Rough]) -> None:
     net = make(0).mesh().net
     partition = Partition(net, np.zeros(len(net.arc), bool))
-    assert (partition.label[net.degree > 0] == BETWEEN_HALVES).all()
+    assert (partition.label[net.degree > 0] == BETWEEN_PARTS).all()
 
 
 def in_independent_sets(make: Callable[..., Rough], monkeypatch: pytest.MonkeyPatch, seed: int = 1) -> Rough:
-    """A relief small enough for a test that is settled and searched in halves all the same."""
-    monkeypatch.setattr(equalize, "NODES_SETTLED_IN_HALVES", 50)
-    monkeypatch.setattr(equalize, "NODES_SEARCHED_IN_HALVES", 10)
+    """A mesh small enough for a test that is settled and searched in parts all the same."""
+    monkeypatch.setattr(equalize, "NODES_SETTLED_IN_PARTS", 50)
+    monkeypatch.setattr(equalize, "NODES_SEARCHED_IN_PARTS", 10)
     return make(seed)
 
 
@@ -84,12 +84,12 @@ def test_each_node_settles_in_one_share_and_no_member_joins_two_that_settle_at_o
     assert min(len(first), len(second)) > 0.3 * (net.degree > 0).sum()
     beside = {u for v in first.tolist() for u in net.ring[v, : net.degree[v]].tolist()}
     assert not beside & set(second.tolist())
-    monkeypatch.setattr(equalize, "NODES_SETTLED_IN_HALVES", 10_000)
+    monkeypatch.setattr(equalize, "NODES_SETTLED_IN_PARTS", 10_000)
     assert [some.tolist() for some in equalize.independent_sets_of(net)] == [np.flatnonzero(net.degree > 0).tolist()]
 
 
 @pytest.mark.parametrize("processors", [1, 4])
-def test_equalizing_in_halves_leads_to_the_same_grid_on_any_machine(
+def test_equalizing_in_parts_leads_to_the_same_grid_on_any_machine(
     make: Callable[..., Rough], processors: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     nets = []
@@ -106,20 +106,20 @@ def test_equalizing_in_halves_leads_to_the_same_grid_on_any_machine(
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_halves_settle_as_well_as_the_whole(
+def test_parts_settle_as_well_as_the_whole(
     make: Callable[..., Rough], seed: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     energies, sweeps = [], []
     for many in (50, 10_000):
         mesh = make(seed).mesh()
-        monkeypatch.setattr(equalize, "NODES_SETTLED_IN_HALVES", many)
+        monkeypatch.setattr(equalize, "NODES_SETTLED_IN_PARTS", many)
         sweeps.append(equalize.settle(mesh, equalize.LENGTH_WEIGHT, 1e-7, 400))
         energies.append(equalize.energy_of_node(mesh))
     assert max(sweeps) < 400
     assert energies[0] == pytest.approx(energies[1], rel=0.01)
 
 
-def test_what_lies_between_is_searched_after_the_halves(
+def test_what_lies_between_is_searched_after_the_parts(
     make: Callable[..., Rough], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     mesh = in_independent_sets(make, monkeypatch, 2).mesh()
@@ -131,7 +131,7 @@ def test_what_lies_between_is_searched_after_the_halves(
         return net.nodes, net.ring, net.degree, net.kind, net.curve, net.ideal, net.line
 
     def look(partition: Partition, work: Any) -> None:
-        between = (partition.label == BETWEEN_HALVES) & (net.degree > 0)
+        between = (partition.label == BETWEEN_PARTS) & (net.degree > 0)
         old = [array[between].copy() for array in of_net()]
         run(partition, work)
         seen.append([np.array_equal(array[between], was) for array, was in zip(of_net(), old, strict=True)])
@@ -147,7 +147,7 @@ def test_what_lies_between_is_searched_after_the_halves(
 
 
 @pytest.mark.parametrize("processors", [1, 4])
-def test_kicks_in_halves_lead_to_the_same_grid_on_any_machine(
+def test_perturbations_in_parts_lead_to_the_same_grid_on_any_machine(
     make: Callable[..., Rough], processors: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     nets = []
@@ -166,7 +166,7 @@ def test_kicks_in_halves_lead_to_the_same_grid_on_any_machine(
         assert one.tobytes() == other.tobytes()
 
 
-def test_what_lies_between_stays_while_the_halves_are_kicked(
+def test_what_lies_between_stays_while_the_parts_are_perturbed(
     make: Callable[..., Rough], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     mesh = make(2).mesh()
@@ -175,7 +175,7 @@ def test_what_lies_between_stays_while_the_halves_are_kicked(
     names, seen, run = ("nodes", "ring", "degree"), [], Partition.run
 
     def look(partition: Partition, work: Any) -> None:
-        parts = [(partition.label == label) & (net.degree > 0) for label in (BETWEEN_HALVES, 0, 1)]
+        parts = [(partition.label == label) & (net.degree > 0) for label in (BETWEEN_PARTS, 0, 1)]
         old = {name: getattr(net, name).copy() for name in names}
         run(partition, work)
         seen.append([any((getattr(net, name)[part] != old[name][part]).any() for name in names) for part in parts])

@@ -23,7 +23,7 @@ MAKERS = {
 
 @pytest.fixture(params=sorted(MAKERS))
 def settled(request: pytest.FixtureRequest) -> tuple[Rough, WorkingMesh, Scratch, Area]:
-    """A rough grid, settled, with room for kicks."""
+    """A rough grid, settled, with room for perturbations."""
     rough = MAKERS[request.param]()
     mesh = rough.mesh()
     settle(mesh, LENGTH_WEIGHT, 1e-4, 30)

@@ -298,7 +298,7 @@ def test_the_command_writes_plates_or_balls_or_nothing(
         assert reason in said and said.count("\n") == 1, said
     Path("q_1.3mf").write_text("mine")
     assert main(f"print grid.json q.3mf {sizes} --bed 100x90x60".split()) == 2
-    assert "q_1.3mf is there already" in capsys.readouterr().err
+    assert "q_1.3mf exists already" in capsys.readouterr().err
     Path("q_1.3mf").unlink()
     assert {path: path.read_bytes() for path in tmp_path.iterdir()} == before
 

@@ -19,7 +19,7 @@ def test_nodes_lie_nearer_to_the_true_surface_than_half_the_noise(lines: float) 
 
 
 def heights(shape: Shape, nodes: np.ndarray) -> np.ndarray:
-    """How far nodes lie off the plane of the nearest true triangle: beside the rim too, where the surface itself has ended."""
+    """How far nodes lie off the plane of the nearest true triangle: beside the boundary too, where the surface itself has ended."""
     corners = shape.surface.nodes[shape.surface.triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     near = cKDTree(corners.mean(axis=1)).query(nodes)[1]
@@ -29,7 +29,7 @@ def heights(shape: Shape, nodes: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("name", ["scallop", "cloth"])
 def test_noise_is_averaged_at_a_rim_too_and_moves_corners_little(name: str) -> None:
-    """Off by as little as the mean of 17 points would be, at the rim of 5: there a patch has half of its points, all to one side.
+    """Off by as little as the mean of 17 points would be, at the boundary of 5: there a patch has half of its points, all to one side.
 
     At a corner it has a quarter of them, so nothing is averaged there, but the noise is hardly made larger either.
     """

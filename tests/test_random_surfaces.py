@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 import scantruss as st
 
 KEPT = {  # seeds that failed or came out worst, their method and effort
-    45: "default normal",  # noise makes corners of smooth rims: angles of 13 and 152 degrees
+    45: "default normal",  # noise makes corners of smooth boundaries: angles of 13 and 152 degrees
     152: "default normal",  # the same: twenty-one corners where there is none, angles of 8 and 163 degrees
 }
 
@@ -49,7 +49,7 @@ def test_seeds_that_are_kept_come_out_right(seed: int) -> None:
 @settings(max_examples=8)
 @given(some.integers(0, 10**6))
 def test_what_is_asked_for_can_be_had(seed: int) -> None:
-    """Rims keep apart and are long enough, points lie on the surface and reach all of its rims."""
+    """Boundaries keep apart and are long enough, points lie on the surface and reach all of its boundaries."""
     surface = random_surface(seed)
     member = surface.length
     assert surface.facts["neck"] >= NECK

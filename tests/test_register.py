@@ -295,8 +295,8 @@ def test_poses_are_read_back_as_they_were_written(tmp_path: Path) -> None:
         ('{"a": [[1, 0], [0, 1]]}', "needs a 4 x 4 matrix"),
         ('{"a": {"R": [1, 2], "t": [0, 0, 0]}}', "needs a 4 x 4 matrix"),
         ('{"a": [[1,0,0,NaN],[0,1,0,0],[0,0,1,0],[0,0,0,1]]}', "needs a 4 x 4 matrix"),
-        ('{"a": [[2,0,0,0],[0,2,0,0],[0,0,2,0],[0,0,0,1]]}', "no rigid motion"),
-        ('{"a": [[1,0,0,0],[0,1,0,0],[0,0,-1,0],[0,0,0,1]]}', "no rigid motion"),
+        ('{"a": [[2,0,0,0],[0,2,0,0],[0,0,2,0],[0,0,0,1]]}', "not a rigid motion"),
+        ('{"a": [[1,0,0,0],[0,1,0,0],[0,0,-1,0],[0,0,0,1]]}', "not a rigid motion"),
     ],
 )
 def test_a_broken_file_of_poses_is_refused(tmp_path: Path, text: str, words: str) -> None:

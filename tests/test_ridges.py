@@ -295,7 +295,7 @@ def test_the_error_of_a_fold_is_that_of_least_squares(seed: int, folded: bool) -
 
 @pytest.mark.kernels
 def test_a_fold_is_measured_where_it_is() -> None:
-    """Planes that meet at a known angle: place, direction and angle, from sites to both sides of it."""
+    """Planes that meet at a known angle: place, direction and angle, from samples to both sides of it."""
     rng = np.random.default_rng(1)
     for degrees in (30.0, 60.0, 90.0):
         slope = np.tan(np.radians(0.5 * degrees))

@@ -132,7 +132,7 @@ def test_the_box_of_a_piece_holds_it_and_little_else_wherever_it_lies(at: tuple[
 
 @pytest.mark.parametrize("length", [1.0, 3.0])
 def test_strays_are_left_out_however_long_the_members(length: float) -> None:
-    """Long members reach from stray to stray: then nothing passes until the strays are looked for."""
+    """Long members reach from outlier to outlier: then nothing passes until the outliers are looked for."""
     rng = np.random.default_rng(4)
     strays = rng.uniform([-12, -9, -3], [12, 9, 10], (1500, 3))
     points = np.concatenate([roof(rng), strays])

@@ -34,7 +34,7 @@ def test_a_site_has_a_gap_where_no_neighbour_lies_for_more_than_an_angle(
 
 
 def widest_free(surface: Surface, sample: int, radius: float) -> tuple[Any, float, int]:
-    """Middle of the widest run of directions in which a disc that touches a site holds no other one, 9 where there is none."""
+    """Middle of the widest run of directions in which a disc that touches a sample holds no other one, 9 where there is none."""
     mean, u = surface.mean, np.array(across(tuple(surface.normals[sample])))
     turns = 2 * np.pi * np.arange(DISC_DIRECTIONS) / DISC_DIRECTIONS
     out = np.cos(turns)[:, None] * u + np.sin(turns)[:, None] * np.cross(surface.normals[sample], u)
@@ -54,7 +54,7 @@ def widest_free(surface: Surface, sample: int, radius: float) -> tuple[Any, floa
 @settings(max_examples=15)
 @given(st.integers(0, 10**6), st.floats(0.15, 0.4))
 def test_a_site_is_at_the_edge_where_a_disc_that_touches_it_can_be_empty(seed: int, radius: float) -> None:
-    """Points by chance leave gaps between their neighbours at many sites, into most of which no disc fits."""
+    """Points at random leave gaps between their neighbours at many samples, into most of which no disc fits."""
     rng = np.random.default_rng(seed)
     surface = samples_of(np.pad(rng.uniform(0, 2, (250, 2)), ((0, 0), (0, 1))), length=0.3).surface
     count, widest = len(surface.mean), np.radians(75.0)

@@ -47,7 +47,7 @@ def test_a_run_leaves_no_memory_to_be_collected(effort: str) -> None:
 
 
 def thinned(points: np.ndarray, radius: float, capacity: int | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """A site within the radius of each point, and the point of each site; a small capacity lets the table fill up on the way."""
+    """A sample within the radius of each point, and the point of each sample; a small capacity lets the table fill up on the way."""
     capacity = capacity or len(points)
     lower, upper = points.min(axis=0), points.max(axis=0)
     owner, begin, count = np.full(len(points), -1, np.int64), 0, 0
@@ -234,7 +234,7 @@ def test_one_sided_surfaces_are_refused_in_any_pose_and_size(seed: int) -> None:
 @given(st.integers(0, 1000))
 @settings(max_examples=6)
 def test_orientation_does_not_depend_on_the_signs_it_starts_from(seed: int) -> None:
-    """Whatever the signs of the normals, all of a piece end on one side: that of its first site or the other."""
+    """Whatever the signs of the normals, all of a piece end on one side: that of its first sample or the other."""
     surface = small_ball()
     signs = np.random.default_rng(seed).choice([-1.0, 1.0], len(surface.mean))
     normals = surface.normals * signs[:, None]
@@ -285,7 +285,7 @@ def test_smoothed_normals_leave_out_neighbours_that_face_elsewhere() -> None:
 
 @pytest.mark.parametrize("gap", [0.6, 0.7])
 def test_links_do_not_lead_to_a_second_sheet(gap: float) -> None:
-    """Two plates less than a member apart: no site that is a member away from the rim is linked to the other plate."""
+    """Two plates less than a member apart: no sample that is a member away from the boundary is linked to the other plate."""
     plate = sheet(4, 4, 0.1)
     surface = samples_of(np.concatenate([plate, plate[:, [1, 0, 2]] + [0, 0, gap]])).surface
     upper = surface.mean[:, 2] > surface.mean[:, 2].mean()
@@ -305,13 +305,15 @@ def test_pieces_are_numbered_by_size_and_debris_is_no_piece() -> None:
     assert np.ptp(samples.surface.mean[samples.piece == 1], axis=0)[0] == pytest.approx(4, abs=0.3)
     assert set(samples.piece) == {0, 1, 2}
     pieces, share = samples.left_out
-    assert pieces == 1 and 0.25 / 42.25 < share < 3.0 * 0.25 / 42.25  # a small piece is all rim, where sites lie closer
+    assert (
+        pieces == 1 and 0.25 / 42.25 < share < 3.0 * 0.25 / 42.25
+    )  # a small piece is all boundary, where samples lie closer
     assert samples_of(large).left_out == (0, 0.0)
 
 
 @pytest.mark.parametrize("noise", [0.05, 0.12])
 def test_a_rough_cloud_is_seen_as_a_sheet(noise: float) -> None:
-    """Where the points scatter by a tenth of a member, sites lie nearer to the plane than points, and their normals stand on it."""
+    """Where the points scatter by a tenth of a member, samples lie nearer to the plane than points, and their normals stand on it."""
     points = sheet(12, 10, 0.1, noise=noise)
     surface = samples_of(points).surface
     inside = (abs(surface.mean[:, 0]) < 5) & (abs(surface.mean[:, 1]) < 4)
@@ -362,7 +364,7 @@ def test_repeated_points_change_no_site() -> None:
 
 
 def test_points_are_sorted_where_their_sites_are_many(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The same points, each near those before it; points of few sites stay as they are."""
+    """The same points, each near those before it; points of few samples stay as they are."""
     monkeypatch.setattr(module, "SAMPLES_TO_SORT", 1_000)
     points = sheet(20.0, 20.0, 0.3)
     bounds = bounds_of(points)

@@ -120,7 +120,7 @@ def test_memory_follows_the_result_and_not_the_scan(tmp_path: Path) -> None:
 
 
 def curves_of(grid: st.Grid) -> float:
-    """Mean distance of the rim nodes outside (positive) of the true rim of the plate."""
+    """Mean distance of the boundary nodes outside (positive) of the true boundary of the plate."""
     nodes = (grid.nodes + grid.origin)[np.concatenate(grid.boundary_loops)]
     x, y = nodes[:, 0], nodes[:, 1]
     inside = np.minimum.reduce([np.hypot(x - HOLE[0], y - HOLE[1]) - HOLE[2], x, y, 40 - x, 30 - y])
@@ -128,7 +128,7 @@ def curves_of(grid: st.Grid) -> float:
 
 
 def test_a_scan_larger_than_memory_gives_the_same_grid_within_the_noise(tmp_path: Path) -> None:
-    """The cloud is so dense that a box holds 14 points; means alone would lose 0.04 of rim."""
+    """The cloud is so dense that a box holds 14 points; means alone would lose 0.04 of boundary."""
     points = plate(600_000)
     np.save(tmp_path / "scan.npy", points)
     settings = st.Settings(length=4.0, effort="quick")
@@ -142,7 +142,7 @@ def test_a_scan_larger_than_memory_gives_the_same_grid_within_the_noise(tmp_path
     rims = [boundary_of(*each).loops for each in ((cloud, thinned), (st.PointCloud.from_array(points), settings))]
     for one, other in zip(*rims, strict=True):
         assert one.length == pytest.approx(other.length, rel=0.002) and len(one.corners) == len(other.corners)
-    assert abs(curves_of(whole)) < 0.003  # of the true rim
+    assert abs(curves_of(whole)) < 0.003  # of the true boundary
     assert abs(curves_of(found)) < 0.0075
     nodes = found.nodes + found.origin
     assert np.abs(nodes[:, 2] - 0.01 * nodes[:, 0] * (40 - nodes[:, 0])).mean() < 0.01
@@ -350,7 +350,7 @@ def test_a_sweep_leaves_no_grids_beside_a_table_that_does_not_know_them(
     for path in (place / "out").glob("length-6.*"):
         path.unlink()
     (place / "out" / "length-0.1.json").write_text("{}")
-    assert "length-0.1.json is there already" in refused(capsys, *words, "--length", "7,0.1")
+    assert "length-0.1.json exists already" in refused(capsys, *words, "--length", "7,0.1")
     (place / "out" / "length-0.1.json").write_text('{"made_by": "ScanTruss 0.1.0"}')
     assert main([*words, "--length", "7,0.1"]) == 0
     assert sorted(entry.name for entry in os.scandir("out") if entry.name.startswith("length")) == [

@@ -125,7 +125,7 @@ def test_the_user_goes_before_the_file(tmp_path: Path) -> None:
 def test_a_unit_without_a_name_is_brought_to_metres(tmp_path: Path) -> None:
     cloud = read_points(scan(tmp_path, wkt(plane('UNIT["yard",0.9144]'))))
     assert cloud.unit == "m" and np.allclose(cloud.points + cloud.origin, 0.9144 * P, atol=1e-9)
-    assert "brought to m" in cloud.notes[0]
+    assert "converted to m" in cloud.notes[0]
 
 
 @pytest.mark.parametrize("record", [wkt(GEOGRAPHIC), keys((1024, 2), (2048, 4326))])
@@ -234,7 +234,7 @@ def test_the_scan_with_heights_in_feet_is_noticed() -> None:
     path = DATA / "real" / "nc_lidar_south.laz"
     assert "look like feet" in read_points(path).notes[0]
     cloud = read_points(path, unit="m", selection=Selection(z_unit="foot"))
-    assert 130 < np.ptp(cloud.points[:, 2]) < 135 and "are brought to m" in cloud.notes[0]
+    assert 130 < np.ptp(cloud.points[:, 2]) < 135 and "are converted to m" in cloud.notes[0]
 
 
 # ---- several files as one scan -------------------------------------------------------------------------------------
@@ -287,7 +287,7 @@ def test_files_of_different_units_are_brought_to_that_of_the_first(tmp_path: Pat
     (tmp_path / "d.e57").write_bytes(e57((__import__("scan_files").axes(P), "")))
     cloud = read_points(f"{tmp_path}/*.*")
     assert cloud.unit == "m" and np.allclose(cloud.points + cloud.origin, np.tile(P, (4, 1)), atol=1e-9)
-    assert "b.ply is in mm and is brought to m, the unit of the first file" in cloud.notes
+    assert "b.ply is in mm and is converted to m, the unit of the first file" in cloud.notes
     part = read_points(f"{tmp_path}/*.ply", selection=Selection(crop=("box:0,0,20,30",)))
     assert len(part.points) == 2 * (P[:, 0] <= 20).sum()  # what is cropped is in the unit of the result
     assert any(note.startswith("c.xyz does not state its unit") for note in cloud.notes)

@@ -467,8 +467,8 @@ def test_the_command_writes_all_or_nothing(
         file.writestr("docProps/core.xml", "<creator>somebody</creator>")
     before = {path: path.read_bytes() for path in tmp_path.iterdir()}
     for line, status, reason in (
-        ("grid.json b.csv --tube 60", 2, "b_nodes.csv is there already"),
-        ("grid.json theirs.xlsx --tube 60", 2, "theirs.xlsx is there already"),
+        ("grid.json b.csv --tube 60", 2, "b_nodes.csv exists already"),
+        ("grid.json theirs.xlsx --tube 60", 2, "theirs.xlsx exists already"),
         ("grid.json grid.json --tube 60", 2, "no format"),
         ("grid.json c.xlsx", 2, "--tube"),
         ("grid.json --tube 60", 2, "missing OUT"),

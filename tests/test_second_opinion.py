@@ -26,7 +26,7 @@ SPOILT = ("none", "off", "near", "collapsed", "holed", "split", "flap", "crossed
 
 
 def barrel(seed: int, outliers: int = 0) -> np.ndarray:
-    """Points of a plate bent to a barrel, with noise, and some strays above it."""
+    """Points of a plate bent to a barrel, with noise, and some outliers above it."""
     rng = np.random.default_rng(seed)
     x, y = rng.uniform(0.0, 7.0, 1200), rng.uniform(0.0, 5.0, 1200)
     points = np.column_stack([8 * np.sin(x / 8), y, 8 * np.cos(x / 8) + rng.normal(0.0, 0.01, 1200)])

@@ -35,7 +35,7 @@ def test_points_that_are_no_numbers_are_told_of_in_the_same_words(
 def test_one_of_several_clouds_is_named(capsys: pytest.CaptureFixture[str]) -> None:
     notes = (
         "7 points outside the box are left out",
-        "a.las is in foot and is brought to m, the unit of the first file",
+        "a.las is in foot and is converted to m, the unit of the first file",
     )
     cloud = PointCloud(np.zeros((1, 3)), np.zeros(3), dropped=2, notes=notes)
     for name in ("", "a.las"):

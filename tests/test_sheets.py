@@ -1,4 +1,4 @@
-"""Sheets side by side, a fraction of a member apart, are told apart by links, rims and cover."""
+"""Sheets side by side, a fraction of a member apart, are told apart by links, boundaries and cover."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ from typed import known
 import scantruss as st
 from scantruss.check.certify import certify
 from scantruss.check.sheets import faults_on_sheets, nodes_of_samples
-from scantruss.kernels.boundary import loops as kernels
+from scantruss.kernels.boundary import room as kernels
 from scantruss.kernels.surface import normals as facing
 from scantruss.pipeline import grid_from_cloud
 from scantruss.surface.samples import sample_surface
@@ -62,7 +62,7 @@ def test_a_grid_of_one_sheet_does_not_cover_the_next() -> None:
 
 
 def test_thick_sites_give_up_thin_ones_that_stand_over_them() -> None:
-    """Site 0 is linked to its own plate and to one site of a plate above: that link goes, and its normal is upright again."""
+    """Site 0 is linked to its own plate and to one sample of a plate above: that link goes, and its normal is upright again."""
     flat = np.stack(np.meshgrid(np.arange(4.0), np.arange(4.0)), axis=-1).reshape(-1, 2)
     low, high = np.column_stack([flat, np.zeros(16)]), np.column_stack([flat, np.full(16, 1.2)])
     mean = np.concatenate([low, high])

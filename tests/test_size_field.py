@@ -49,7 +49,7 @@ def across(points: np.ndarray, low: float, high: float) -> Callable[[np.ndarray]
 
 
 def field_of(points: np.ndarray, **settings: Any) -> tuple[np.ndarray, Surface]:
-    """The desired lengths at the sites of a cloud [scan unit], and the surface."""
+    """The desired lengths at the samples of a cloud [scan unit], and the surface."""
     samples = samples_of(points, settings.pop("length", 0.0), **settings)
     return samples.surface.length * samples.surface.field, samples.surface
 
@@ -256,7 +256,7 @@ def test_a_hole_is_judged_by_the_members_around_it() -> None:
     points = sheet(16.0, 8.0, 0.15, keep=lambda x, y: np.minimum(np.hypot(x + 5, y), np.hypot(x - 5, y)) > 0.75)
     settings = Settings(length_field=((-5, 0, 0, 0.9), (-2, 0, 0, 0.9), (3, 0, 0, 2.4), (5, 1, 0, 2.4), (7, 0, 0, 2.4)))
     grid = st.grid_from_points(points, settings)
-    assert grid.topology.boundary_loops == 2  # the rim, and the hole where members are short
+    assert grid.topology.boundary_loops == 2  # the boundary, and the hole where members are short
     small = min(grid.boundary_loops, key=len)
     assert abs((grid.nodes[small] + grid.origin)[:, 0].mean() + 5.0) < 0.3
 

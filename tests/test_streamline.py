@@ -55,7 +55,7 @@ def test_a_scan_as_dense_as_its_patches_need_is_taken_whole() -> None:
 
 
 def test_a_grid_of_a_dense_scan_is_that_of_the_surface() -> None:
-    """Eight times as many points as patches take: fewer are kept, corners, rim and surface are as true."""
+    """Eight times as many points as patches take: fewer are kept, corners, boundary and surface are as true."""
     shape = make("l_plate", 300_000, seed=2)
     settings = st.Settings(length=1.5 * shape.length, effort="quick")
     cloud = st.PointCloud.from_array(shape.points)
@@ -70,7 +70,7 @@ def test_a_grid_of_a_dense_scan_is_that_of_the_surface() -> None:
 
 
 def test_the_rim_of_a_dense_scan_is_found_with_all_its_points() -> None:
-    """A disc: its rim lies no farther inside than that of a scan that is taken whole, though patches have few of the points."""
+    """A disc: its boundary lies no farther inside than that of a scan that is taken whole, though patches have few of the points."""
     rng = np.random.default_rng(5)
     angle, radius = rng.uniform(0, 2 * np.pi, 400_000), 10.0 * np.sqrt(rng.uniform(0, 1, 400_000))
     points = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), np.zeros(400_000)])

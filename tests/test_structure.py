@@ -161,7 +161,7 @@ def test_patch_of_the_beam_bends_to_a_parabola() -> None:
 
 
 def test_patch_of_the_bar_keeps_a_strain_that_is_the_same_everywhere() -> None:
-    """The rim of a flat lattice moves by a linear field: so do the nodes within, and parallel members have one force."""
+    """The boundary of a flat lattice moves by a linear field: so do the nodes within, and parallel members have one force."""
     grid = dome(7, 10.0)
     flat = grid.replace(nodes=grid.nodes * [1, 1, 0])
     truss = Truss.from_grid(flat, scale=1, unit="mm", supports="boundary", joints="pinned")

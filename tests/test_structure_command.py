@@ -232,7 +232,7 @@ def test_what_is_odd_in_what_was_given_is_said(place: Path, capsys: pytest.Captu
     )
     assert run("structure grid.json out.json --settings odd.toml --supports lowest:50") == 0
     said = capsys.readouterr().out
-    assert "warning: 49 of 49 nodes are held; heights of supports are in metres" in said
+    assert "warning: 49 of 49 nodes are supported; heights of supports are in metres" in said
     assert 'force = [0, 0, -2] has no unit and is taken in N; write it as "-2N"' in said
     assert "have none of SLS" in said and "supports: 49 nodes, 0 to " in said
     assert (
@@ -241,7 +241,9 @@ def test_what_is_odd_in_what_was_given_is_said(place: Path, capsys: pytest.Captu
     )
     said = capsys.readouterr().out
     assert (
-        "it does not carry this load" in said and "analysis of first order" not in said and "nodes are held" not in said
+        "it does not carry this load" in said
+        and "analysis of first order" not in said
+        and "nodes are supported" not in said
     )
 
 
@@ -275,7 +277,7 @@ def test_what_is_odd_in_what_was_given_is_said(place: Path, capsys: pytest.Captu
         ("grid.json out.json --loads self,self", "the load self is given 2 times"),
         ("grid.json out.json --loads snow:-1kN/m2", "snow weighs down and must be positive"),
         ("grid.json out.json --loads temperature:30", "write it as 30K"),
-        ("grid.json out.json --loads self snow:1kN/m2", "snow:1kN/m2 is no file to write"),
+        ("grid.json out.json --loads self snow:1kN/m2", "snow:1kN/m2 is not a file to write"),
         ("grid.json out.json --loads no.toml", "cannot read no.toml"),
         ("grid.json out.json --scale 0", "scale must be a positive number"),
         ("grid.json out.json --buckling 99", "numbers of modes, 0 to 50"),

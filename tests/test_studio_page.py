@@ -113,7 +113,7 @@ def test_without_viser_the_command_names_the_extra(
     ("words", "said"),
     [
         ("studio none.ply --no-open", "there is no file none.ply"),
-        ("studio a.xyz --no-open", "a.scantruss is there already"),
+        ("studio a.xyz --no-open", "a.scantruss exists already"),
         ("studio a.xyz --project b.zip --no-open", "use one of .scantruss"),
         ("studio --port 99999 --no-open", "--port needs a number"),
     ],

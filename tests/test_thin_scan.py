@@ -164,7 +164,7 @@ def test_files_of_different_units_come_together_in_any_order() -> None:
     for names in ("abcdefg", "cdagfeb"):
         files = [str(next(Path().glob(f"{name}.*"))) for name in names]
         found, held = check(files, selection=Selection(crop=("box:0,0,20,30",)))
-        assert found.unit == "m" and any("brought to m, the unit of the first file" in note for note in held.notes)
+        assert found.unit == "m" and any("converted to m, the unit of the first file" in note for note in held.notes)
         assert len(held.points) == 7 * (P[:, 0] <= 20).sum()
 
 
@@ -239,7 +239,7 @@ def test_thin_takes_the_options_of_reading_and_carries_the_unit(capsys: pytest.C
     words = ["--spacing", "1.7", "--class", "2,6", "--crop", "ring.txt"]
     assert main(["thin", "a.las", "-o", "thin.ply", *words]) == 0
     said = "".join(capsys.readouterr())
-    assert "of other classes are left out" in said and "the heights are brought to m" in said
+    assert "of other classes are left out" in said and "the heights are converted to m" in said
     taken = Selection(classes=(2, 6), crop=(polygon_text([RING]),))
     thin = read_points("thin.ply")
     assert thin.unit == "m"

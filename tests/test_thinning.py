@@ -134,7 +134,7 @@ def test_a_scan_that_has_changed_between_two_readings_is_refused() -> None:
 
 
 def plate(count: int, seed: int = 1) -> tuple[np.ndarray, np.ndarray]:
-    """Points on an inclined plate of 20 x 15 with a round hole; their distance inside the rim."""
+    """Points on an inclined plate of 20 x 15 with a round hole; their distance inside the boundary."""
     rng = np.random.default_rng(seed)
     flat = rng.uniform(0, (20, 15), (count, 2))
     inside = np.hypot(flat[:, 0] - 11, flat[:, 1] - 7) - 3

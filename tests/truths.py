@@ -21,7 +21,7 @@ class Truth:
     noise: float = 0.02  #: standard deviation of each coordinate [scan unit]
     count: int = 100_000  #: number of points
     keep: Callable[[Floats], Floats] | None = None  #: points and surface are kept where this is positive
-    corners: Floats = field(default_factory=lambda: np.zeros((0, 3)))  #: (C, 3) true corners of the rim
+    corners: Floats = field(default_factory=lambda: np.zeros((0, 3)))  #: (C, 3) true corners of the boundary
     fixed: Floats = field(default_factory=lambda: np.zeros((0, 3)))  #: (F, 3) positions that must become nodes
     orientable: bool = True
     unit: str = "mm"
@@ -110,7 +110,7 @@ def scallop() -> Truth:
 
     lift = height(z)
     surface = disc(outline, np.array([0.0, 0.0]), int(55 / (length * STEP)), lift)
-    near_boundary = np.array([48.3, 14.0])  # about half a member from the rim: the paper's node a
+    near_boundary = np.array([48.3, 14.0])  # about half a member from the boundary: the paper's node a
     fixed = lift(np.array([near_boundary, (-12.0, 15.0), (8.0, -20.0)]))
     return Truth((surface,), length, count=120_000, corners=lift(ears), fixed=fixed)
 

@@ -141,7 +141,7 @@ def aims(rows: Sequence[Row]) -> list[tuple[str, bool]]:
     for words, test in AIMS:
         met, asked = _all(by_cloud(rows), test)
         where = (
-            f"met on {met} of {asked} clouds where it can be asked" if asked else "no way that it asks for on any cloud"
+            f"met on {met} of {asked} clouds to which it applies" if asked else "no way that it asks for on any cloud"
         )
         found.append((f"{words}: {where}", met == asked))
     return found

@@ -34,12 +34,13 @@ MANY_OUTLIERS = 0.002  # share of the points that must be outliers for a grid to
 FAULTS_WITHOUT_RIDGES = 6  # places at which ridges are given up, before they all are
 COARSEST_SAMPLES = 0.5  # largest of them, in desired lengths
 FAR_FROM_PASSING = 12  # cuts and missing boundary loops above which other fronts with the same samples do not help
-# share of the scan that a grid misses above which the same holds, in shares that may be missing; of thin limbs 1
+# share of the scan that a grid misses above which other fronts do not help either, in shares that may be missing; of thin limbs 1
 FAR_MISSING = 2.0
 MOST_RUNS = 24  # grids that are made at most, before a scan is refused
-MOST_RUNS_OF_CELLS = 3  # the same of quads or hexagons, which are made of triangles that pass
+MOST_RUNS_OF_CELLS = 3  # grids of quads or hexagons that are made at most; they are made of triangles that pass
 MOST_FAR, MOST_GIVEN_UP = 2, 3  # attempts in a row of the same settings that are so far from passing, and such settings
-MOST_FAR_OF_BODY = 1  # the same of a body without thin limbs, which is so smooth that other fronts would come no nearer
+# such attempts in a row for a body without thin limbs, which is so smooth that other fronts come no nearer
+MOST_FAR_OF_BODY = 1
 
 
 @dataclass(frozen=True)

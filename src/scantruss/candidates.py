@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack, suppress
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import partial
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 from .attempts import VERY_ROUGH_SCAN
 from .check.certify import checked, passed_grid
@@ -17,7 +15,7 @@ from .front.orientation_field import Field, orientation_fields
 from .improve.equalize import energy_of_node
 from .improve.optimize import improve_first, improve_last, searched_again, with_tips
 from .improve.rings import finish_rings
-from .runtime.parallel import processors
+from .runtime.parallel import threaded_map
 from .runtime.progress import Progress, WatchedProgress, seer_of
 from .surface.scratch import with_own_scratch
 
@@ -28,9 +26,6 @@ if TYPE_CHECKING:
     from .improve.working_mesh import WorkingMesh
     from .settings import Settings
     from .surface.samples import SurfaceSamples
-
-Job = TypeVar("Job")
-Result = TypeVar("Result")
 
 FULLY_IMPROVED = {"quick": 1, "normal": 1, "best": 3}  # fronts that are improved to the end
 # energy a node of the share of the scan that is missed, of its distance at 95 %, and at 99 % where tips count [members]
@@ -91,12 +86,25 @@ def advance_fronts(
     *,
     progress: Progress | None = None,
 ) -> list[Grid]:
-    """Return what the fronts leave behind that advance over a scan, one for each field (Fig. 4); see `front.advance.advance_front`.
+    """Return the grids that fronts leave behind, one front for each field; a front is `front.advance.advance_front`.
+
+    Parameters
+    ----------
+    samples : SurfaceSamples
+        The surface samples of the scan.
+    boundary : Boundary
+    constraints : Constraints
+        Fixed nodes, fixed lines and ridges.
+    fields : sequence of Field
+        Those of `orientation_fields`.
+    settings : Settings
+    progress : callable, optional
+        Called with ("front", share); may raise to stop.
 
     Raises
     ------
     FrontError
-        None has come to its end; the fault of the first.
+        No front came to its end; the fault of the first.
     """
     see = seer_of(progress)
     first = progress if len(fields) == 1 or see is None else WatchedProgress(None, see)  # of several one is seen
@@ -113,7 +121,7 @@ def advance_fronts(
         except FrontError as error:
             return error
 
-    found = _side_by_side(advance, fields, _part(progress, "front", 0.0, 1.0))
+    found = threaded_map(advance, fields, _part(progress, "front", 0.0, 1.0))
     fronts = [front for front in found if not isinstance(front, FrontError)]
     if not fronts:
         raise next(error for error in found if isinstance(error, FrontError))
@@ -137,7 +145,7 @@ def improve_fronts(
         mesh = improve_first(front, samples, boundary, constraints, settings)
         return Candidate(front, settings, mesh)
 
-    found = _side_by_side(improve, fronts, _part(progress, "optimize", 0.0, 0.5))
+    found = threaded_map(improve, fronts, _part(progress, "optimize", 0.0, 0.5))
     ordered = sorted(found, key=lambda candidate: candidate.energy) if len(found) > 1 else found
     return ordered
 
@@ -195,7 +203,7 @@ def those_that_pass(
     size = FULLY_IMPROVED[settings.effort]
     for begin in range(0, min(len(candidates), FINALIST_BATCHES * size), size):
         batch = candidates[begin : begin + size]
-        _side_by_side(finish, batch, _part(progress, "optimize", 0.5, 1.0))
+        threaded_map(finish, batch, _part(progress, "optimize", 0.5, 1.0))
         passed += [candidate for candidate in batch if candidate.grid is not None]
         if any(not candidate.is_poor for candidate in passed):
             break
@@ -331,7 +339,26 @@ def optimize_fronts(
     *,
     progress: Progress | None = None,
 ) -> Grid:
-    """Return the best grid that comes of some fronts and passes the checks, with its certificate (Sec. 4)."""
+    """Return the best grid that can be made of some fronts and passes the checks, with its certificate (Sec. 4).
+
+    Parameters
+    ----------
+    fronts : sequence of Grid
+        Those of `advance_fronts`.
+    samples : SurfaceSamples
+        The surface samples of the scan.
+    boundary : Boundary
+    constraints : Constraints
+        Fixed nodes, fixed lines and ridges.
+    settings : Settings
+    progress : callable, optional
+        Called with ("optimize", share); may raise to stop.
+
+    Raises
+    ------
+    FrontError
+        No grid passes; the fault of the first.
+    """
     improved = improve_fronts(fronts, samples, boundary, constraints, settings, progress=progress)
     return best_that_passes(improved, samples, boundary, constraints, settings, progress=progress)
 
@@ -339,25 +366,3 @@ def optimize_fronts(
 def _part(progress: Progress | None, stage: str, begin: float, end: float) -> Callable[[float], None] | None:
     """Report a share of a part of a stage."""
     return (lambda share: progress(stage, begin + (end - begin) * share)) if progress else None
-
-
-def _side_by_side(
-    work: Callable[[Job], Result], jobs: Sequence[Job], report: Callable[[float], None] | None
-) -> list[Result]:
-    """Return what the work returns for each job, done on all processors."""
-    done = []
-    workers = min(processors(), len(jobs))
-    with ExitStack() as stack:
-        results: Iterable[Result]
-        if workers < 2:
-            results = map(work, jobs)
-        else:
-            pool = stack.enter_context(ThreadPoolExecutor(workers))
-            futures = [pool.submit(partial(work, job)) for job in jobs]
-            stack.callback(lambda: [future.cancel() for future in futures])
-            results = (future.result() for future in futures)
-        for count, result in enumerate(results, 1):
-            done.append(result)
-            if report:
-                report(count / len(jobs))
-    return done

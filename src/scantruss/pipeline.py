@@ -1,4 +1,4 @@
-"""The whole method: scan -> boundary -> front -> grid (Figs. 1 and 4)."""
+"""The whole method: scan -> boundary -> front -> grid (Fig. 1)."""
 
 from __future__ import annotations
 
@@ -37,11 +37,11 @@ def grid_from_points(
     points : (N, 3) array
         Measured points [scan unit].
     settings : Settings
-        Desired member length and all the rest.
+        Desired member length and everything else.
     progress : callable, optional
-        ``progress(stage, share)``, called now and then; may raise to cancel.
+        ``progress(stage, share)``, called from time to time; may raise to cancel.
     keep_failed : bool
-        Return a grid that fails its certificate too; else that is a `CertificateError`, which has it as `.grid`.
+        Return a grid even if it fails its certificate; otherwise that raises a `CertificateError`, whose `.grid` it is.
 
     Returns
     -------
@@ -57,7 +57,7 @@ def grid_from_points(
 def grid_from_scan(
     path: str | Path, settings: Settings, *, progress: Progress | None = None, keep_failed: bool = False
 ) -> Grid:
-    """Return the grid of a scan file; see `grid_from_points`. One that is larger than memory is thinned while it is read."""
+    """Return the grid of a scan file; see `grid_from_points`. A scan larger than memory is thinned while it is read."""
     started = perf_counter()
     cloud, settings = read_to_fit(path, Settings.check(settings), progress=progress)
     spent = perf_counter() - started
@@ -77,15 +77,15 @@ def grid_from_cloud(
     Parameters
     ----------
     cloud : PointCloud
-        What was read.
+        The scan.
     settings : Settings
-        Desired member length and all the rest.
+        Desired member length and everything else.
     progress : callable, optional
         ``progress(stage, share)``.
     keep_failed : bool
-        Return a grid that fails its certificate too.
+        Return a grid even if it fails its certificate.
     read_seconds : float
-        What reading took [s], for the table of times.
+        How long reading took [s], for the table of times.
 
     Returns
     -------
@@ -121,7 +121,7 @@ def symmetric_grid(
 ) -> Grid:
     """Return a grid that keeps mirror planes or a rotation exactly: one part with rows on its edges, and its images.
 
-    A first grid tells where the planes cut the surface; a second has these lines as fixed lines and is cut off along them.
+    A first grid shows where the planes cut the surface; a second has these lines as fixed lines and is cut off along them.
 
     Raises
     ------
@@ -264,7 +264,7 @@ def make_grid_with_most_ridges(
 
 
 def make_grid(cloud: PointCloud, attempt: Attempt, *, progress: Progress | None = None) -> Grid:
-    """Return the grid of one attempt, with its certificate: the method, one line a step (Figs. 1 and 4).
+    """Return the grid of one attempt, with its certificate: the method, one line a step (Fig. 1).
 
     Raises
     ------

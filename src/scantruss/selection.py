@@ -123,7 +123,7 @@ def read_crop(text: str) -> str:
         return _check_part(text)
     path = Path(text)
     if not path.is_file():
-        raise InputError(f"crop must be {FORMS}, got {text[:80]!r}, which is no file")
+        raise InputError(f"crop must be {FORMS}, got {text[:80]!r}, which is not a file")
     return polygon_text(*read_polygons(path))
 
 
@@ -152,7 +152,7 @@ def read_polygons(path: Path) -> list[list[PolygonRing]]:
     except OSError as error:
         raise FormatError(f"cannot read the polygon {path}: {error.strerror}") from None
     except UnicodeDecodeError:
-        raise FormatError(f"{path} is not a text file; a polygon is GeoJSON, WKT or x, y a line") from None
+        raise FormatError(f"{path} is not a text file; a polygon is GeoJSON, WKT or x, y per line") from None
     if text.startswith("{"):
         polygons = _geojson_polygons(path, text)
     elif re.match(r"(SRID=\d+;\s*)?(MULTI)?POLYGON\b", text, re.IGNORECASE):

@@ -28,7 +28,7 @@ def find_corners(curve: np.ndarray, settings: Settings, coarser: float = 1.0) ->
     """Return where a closed curve has corners and their exact places.
 
     A corner is sought where lines fitted to the curve before and after a point differ most in direction. Quadratics must confirm
-    it: they tell a corner from a bend, while lines are not misled by a ragged boundary. On a ragged loop, which turns everywhere,
+    it: they distinguish a corner from a bend, while lines are not misled by a ragged boundary. On a ragged loop, which turns everywhere,
     a corner must turn more than the rest. It lies where its two sides meet.
 
     Parameters

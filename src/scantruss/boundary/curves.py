@@ -7,7 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from ..kernels.boundary import loops as kernels
+from ..kernels.boundary import room as kernels
 from ..kernels.mesh.point_location import nearest_sample
 from ..kernels.surface.local_surface import Surface
 from ..scan.vectors import dots

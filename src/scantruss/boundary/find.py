@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..errors import InputError, LengthError, words_of_place
-from ..kernels.boundary import loops as kernels
+from ..kernels.boundary import room as kernels
 from ..kernels.boundary.curves import Curves
 from ..kernels.mesh.point_location import nearest_sample
 from ..kernels.surface.local_surface import Surface, walk

@@ -43,7 +43,7 @@ class SamplingBias:
     density: float  #: points per area [1 / scan unit^2]
 
 
-NO_BIAS = SamplingBias(0.0, np.inf)
+NO_BIAS = SamplingBias(0.0, np.inf)  # what method "paper" assumes
 
 
 def sampling_bias_of(surface: Surface, points: np.ndarray, density: float, radius: float) -> SamplingBias:

@@ -55,8 +55,8 @@ def clean_parser() -> Parser:
         steps.add_argument(
             f"--{name}", metavar=metavar, type=number, default=default, help=f"{words} (default {default})"
         )
-        keep, said = KEEP_OPTIONS[name]
-        steps.add_argument(f"--{keep}", action="store_true", help=said)
+        keep, about = KEEP_OPTIONS[name]
+        steps.add_argument(f"--{keep}", action="store_true", help=about)
     steps.add_argument(
         "--judge-outliers",
         metavar="|".join(JUDGE_OUTLIERS),
@@ -101,13 +101,13 @@ def clean(values: Namespace) -> None:
             save.json(report, figures_of_cleaning(result, len(cloud.points)))
     lines = [f"{len(cloud.points):,} points read"] + [step.words for step in result.steps]
     written = [*map(str, outs), *([str(report)] if report else [])]
-    said = [note for out in outs for note in cloud_file_notes(out)]
-    print_lines([*lines, f"wrote {' '.join(written)}: {len(result.points):,} points", *said])
+    notes = [note for out in outs for note in cloud_file_notes(out)]
+    print_lines([*lines, f"wrote {' '.join(written)}: {len(result.points):,} points", *notes])
 
 
 def _outputs(values: Namespace) -> tuple[list[Path], Path | None]:
     """Return where the results go, checked before anything is read."""
-    from ..runtime.files import check_place
+    from ..runtime.places import check_place
 
     outs, taken = claim_clouds(values, "clean cloud")
     report = check_place(values.report, (".json",)) if values.report else None

@@ -40,7 +40,7 @@ def completion_parser() -> Parser:
     parser = Parser(
         "completion",
         "|".join(SHELLS),
-        "Print a script with which a shell completes commands and options.\n"
+        "Print a script that lets your shell complete commands and options.\n"
         'bash: eval "$(scantruss completion bash)" in ~/.bashrc; zsh: the same with zsh in ~/.zshrc;\n'
         "fish: scantruss completion fish > ~/.config/fish/completions/scantruss.fish",
     )
@@ -83,8 +83,8 @@ def _fish(parsers: Parsers) -> str:
     lines = [f"complete -c scantruss -n __fish_use_subcommand -f -a '{' '.join(parsers)}'"]
     for name, parser in parsers.items():
         when = f"-n '__fish_seen_subcommand_from {name}'"
-        for option, (words, said) in _options(parser).items():
-            short = said.replace("%%", "%").split(";")[0].replace("'", "\\'")
+        for option, (words, about) in _options(parser).items():
+            short = about.replace("%%", "%").split(";")[0].replace("'", "\\'")
             takes = f" -x -a '{words}'" if words else ""
             lines.append(f"complete -c scantruss {when} -l {option[2:]}{takes} -d '{short}'")
     lines.append(f"complete -c scantruss -n '__fish_seen_subcommand_from completion' -x -a '{' '.join(SHELLS)}'")

@@ -45,16 +45,16 @@ def convert_parser() -> Parser:
         "--ifc", metavar="|".join(IFC_VIEWS), default="auto", help="what .ifc holds of a structure (default: both)"
     )
     parser.add_argument(
-        "--ifc-schema", metavar="|".join(IFC_EDITIONS), default="IFC4", help="edition of .ifc (default: IFC4)"
+        "--ifc-schema", metavar="|".join(IFC_EDITIONS), default="IFC4", help="version of .ifc (default: IFC4)"
     )
     parser.add_argument("--step", metavar="|".join(STEP_PARTS), default="axes", help="what .step holds (default: axes)")
     parser.add_argument(
         "--inp", metavar="|".join(INP_PROGRAMS), default="abaqus", help="program that .inp is for (default: abaqus)"
     )
     parser.add_argument(
-        "--system", metavar="EPSG:CODE", help="reference system of a scan that names none, for .geojson and .ifc"
+        "--system", metavar="EPSG:CODE", help="reference system, for .geojson and .ifc, of a scan that names none"
     )
-    parser.add_argument("--keep-failed", action="store_true", help="also take a grid that failed its certificate")
+    parser.add_argument("--keep-failed", action="store_true", help="also accept a grid that failed its certificate")
     return parser
 
 

@@ -34,7 +34,7 @@ def families_parser() -> Parser:
     parser = Parser(
         "families",
         "GRID OUT [OUT ...] [--parts lengths|joints|panels] [--tolerance 1%%] [--count 12] [--scan SCAN] [options]",
-        "Move the nodes of a saved grid along its surface, so that its members are of few lengths, or its joints or panels of few kinds.",
+        "Move the nodes of a saved grid along its surface, so that its members have few lengths, or its joints or panels are of few kinds.",
     )
     parser.add_argument("grid", metavar="GRID", help="grid saved as .json by scantruss grid")
     add_outs(parser, "results; the suffix names the format", "*")
@@ -42,34 +42,34 @@ def families_parser() -> Parser:
         "--parts",
         choices=(LENGTHS, JOINTS, PANELS),
         default=LENGTHS,
-        help="what shall be alike: lengths of members, joints, as the directions of their members, or panels (default lengths)",
+        help="what is made alike: lengths of members, joints (the directions of their members) or panels (default lengths)",
     )
     parser.add_argument(
         "--tolerance",
         metavar="SHARE",
         type=share,
         default=0.01,
-        help="largest misfit over the mean member, of joints that of unit directions, of panels that of corners, both as root mean square"
-        " (default 1%%)",
+        help="largest misfit of a member, as a share of the mean member; root mean square of the directions of a joint or of the corners"
+        " of a panel (default 1%%)",
     )
     parser.add_argument(
         "--count",
         metavar="COUNT",
         type=whole_number,
-        help=f"lengths or kinds to aim at (default {USUAL_LENGTHS} lengths; of joints and panels as few kinds as can be)",
+        help=f"lengths or kinds to aim at (default {USUAL_LENGTHS} lengths; of joints and panels as few kinds as possible)",
     )
     parser.add_argument(
         "--mirrored",
         choices=MIRROR_IMAGES,
-        help="whether mirror images of joints or panels are of one kind, as flat panels are that may be turned over (default different)",
+        help="whether mirror images of joints or panels are of one kind, as flat panels are if they may be turned over (default different)",
     )
     parser.add_argument(
         "--uneven",
         metavar="SHARE",
         type=share,
-        help="of joints, by how much members may differ from the mean one, beside those that do already (default 20%%)",
+        help="for joints: by how much members may differ from the mean one, except those that already differ more (default 20%%)",
     )
-    parser.add_argument("--scan", metavar="SCAN", help="scan that the grid is checked against again: its certificate")
+    parser.add_argument("--scan", metavar="SCAN", help="scan to check the new grid against, for its certificate")
     parser.add_argument(
         "--report",
         metavar="FILE",
@@ -78,10 +78,10 @@ def families_parser() -> Parser:
     parser.add_argument(
         "--plot",
         metavar="FILE.png",
-        help="number of lengths or kinds against the largest misfit, and with --scan against the distance from it",
+        help="number of lengths or kinds against the largest misfit and, with --scan, against the distance from the scan",
     )
     parser.add_argument(
-        "--keep-failed", action="store_true", help="also take and write a grid that fails its certificate"
+        "--keep-failed", action="store_true", help="also accept and write a grid that fails its certificate"
     )
     return parser
 
@@ -90,7 +90,8 @@ def families(values: Namespace) -> None:
     """Write a saved grid with members of few lengths, or few kinds of joints or panels."""
     from ..export.formats import GRID, check_output
     from ..report.terminal import Bars, print_lines
-    from ..runtime.files import SaveTogether, check_place
+    from ..runtime.files import SaveTogether
+    from ..runtime.places import check_place
     from .convert import claim_models, write_models
 
     outs = [check_output(out, GRID) for out in outs_of(values)]

@@ -44,7 +44,7 @@ def grid_parser() -> Parser:
         "grid",
         "SCAN OUT [OUT ...] [--length L] [options]",
         "Turn a scan into a triangular grid truss of a desired member length.\n"
-        "The options come in three parts: everyday, expert, and for the method of the paper only.",
+        "The options are in three groups: for every day, for experts, and for the method of the paper only.",
     )
     parser.add_argument("scan", metavar="SCAN", help=SCAN_HELP)
     add_outs(parser, "results; the suffix names the format", "*")
@@ -70,7 +70,7 @@ def grid_parser() -> Parser:
         dest="views",
         metavar="NAME",
         action="append",
-        help=f"side from which a picture is seen: {', '.join(VIEWS)} or AZIMUTH,ELEVATION in degrees; repeatable, side by side",
+        help=f"side from which a picture is taken: {', '.join(VIEWS)} or AZIMUTH,ELEVATION in degrees; repeatable, side by side",
     )
     styles.add_argument("--size", metavar="WIDTHxHEIGHT", type=picture_size, help="size of a picture in pixels")
     styles.add_argument(
@@ -147,8 +147,8 @@ def command_line_of(values: Namespace) -> str:
 def check_outputs(values: Namespace, outs: list[Path], settings_file: Path, report: Path | None) -> None:
     """Refuse outputs that cannot be written, before anything is read or computed."""
     from ..export.formats import check_output
-    from ..runtime.files import check_place
     from ..runtime.ours import check_ours
+    from ..runtime.places import check_place
     from .convert import claim_models
 
     taken = inputs_of(values)

@@ -1,4 +1,4 @@
-"""Grids and structures that commands read: saved by ScanTruss, or drawn by others."""
+"""Grids and structures that commands read: saved by ScanTruss, or drawn in other programs."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ HEAD = 200  # bytes of a file in which its format stands
 DRAWN = ".obj .ply .dxf .3dm .ifc .compas.json"  # that `read_model` reads
 
 
-def add_grid(parser: Parser, said: str, name: str = "grid", metavar: str = "GRID") -> None:
+def add_grid(parser: Parser, about: str, name: str = "grid", metavar: str = "GRID") -> None:
     """Add the argument of a grid, and how one that others drew is read."""
     from .options import number
 
-    parser.add_argument(name, metavar=metavar, help=f"{said}, or lines or faces that others drew: {DRAWN}")
+    parser.add_argument(name, metavar=metavar, help=f"{about}, or lines or faces from another program: {DRAWN}")
     parser.add_argument(
         "--merge",
         metavar="D",
         type=number,
-        help="of lines that others drew: distance within which ends are one node (default: median length/1000)",
+        help="for lines from another program: ends closer than this become one node (default: median length/1000)",
     )
 
 
@@ -34,7 +34,7 @@ def read_saved_grid(path: str, merge: float | None, bars: Bars | None = None) ->
     from ..export.formats import FORMATS, read_model
     from ..export.json import read_grid
     from ..report.terminal import print_lines
-    from ..runtime.files import suffix_of
+    from ..runtime.places import suffix_of
 
     if (row := FORMATS.get(suffix_of(Path(path), FORMATS))) is None or row.draw is None:
         return read_grid(path)

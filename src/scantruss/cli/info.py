@@ -29,7 +29,7 @@ def info_parser() -> Parser:
     parser = Parser(
         "info",
         "SCAN [options]",
-        "Points, extent, spacing, noise and boundaries of a scan, and the results of some member lengths.",
+        "Print points, extent, spacing, noise and boundaries of a scan, and what some member lengths give.",
     )
     parser.add_argument("scan", metavar="SCAN", help=SCAN_HELP)
     add_memory(parser)

@@ -30,20 +30,20 @@ scantruss {__version__}: from a 3D scan straight to a grid truss with nearly equ
   scantruss print GRID OUT.3mf|OUT.stl --member-diameter D --node-diameter D [--scale S]
                                            turn a grid saved as .json into one watertight solid, or
                                            (--bed, --sockets) into parts with plug joints, or balls for rods
-  scantruss families GRID OUT [OUT ...]    move the nodes along the surface, so that members are of few lengths
+  scantruss families GRID OUT [OUT ...]    move the nodes along the surface, so that members have few lengths
   scantruss schedule GRID|STRUCTURE OUT.xlsx|OUT.csv [--tube DxT]
-                                           list nodes, members and panels of a grid or structure as a workshop needs them
+                                           list nodes, members and panels as a workshop needs them
   scantruss setout GRID|STRUCTURE OUT.dxf|OUT.pdf|OUT.csv [--supports corners]
-                                           set out supports (of a grid: --supports), heights, boundaries;
-                                           the order of assembly
+                                           set out supports (for a grid: --supports), heights and boundaries,
+                                           and the order of assembly
   scantruss structure GRID OUT.json --supports corners --loads self,snow:1kN/m2
                                            forces, displacements and checks of the grid as a structure
   scantruss convert FILE OUT [OUT ...]     write a saved grid or structure for other programs: .dxf, .ifc, .saf.xlsx ...
-  scantruss studio [SCAN|PROJECT]          do it in a browser: length, grid, structure, files (extra studio)
+  scantruss studio [SCAN|PROJECT]          do all of this in a browser (extra studio)
   scantruss splice SCAN SCAN [SCAN ...] -o OUT
                                            align overlapping scans and merge them into one cloud
-  scantruss demo  [FOLDER]                 do all of it on a bundled scan, a shell or (--scan bust) a bust
-  scantruss completion bash|zsh|fish       print a script with which a shell completes commands and options
+  scantruss demo  [FOLDER]                 run it all on a bundled scan, a shell or (--scan bust) a bust
+  scantruss completion bash|zsh|fish       print a script that lets your shell complete commands and options
 
 scantruss COMMAND --help lists the options of a command; --version prints the version.
 

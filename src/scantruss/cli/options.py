@@ -108,7 +108,7 @@ def _why_no_number(text: str) -> str:
     if text.endswith("%"):
         return f" without %, got {text}; one percent is 0.01"
     if found := WITH_UNIT.fullmatch(text):
-        return f" without {found[1]}, got {text}; --help tells its unit"
+        return f" without {found[1]}, got {text}; --help names its unit"
     return f", got {text!r}"
 
 
@@ -132,8 +132,8 @@ def length_or_field(text: str) -> float | str:
         raise argparse.ArgumentTypeError(f"{needs}{_with_point(text)}")
     if found := WITH_UNIT.fullmatch(text):
         raise argparse.ArgumentTypeError(
-            f"{needs} in the unit of the scan, without {found[1]} (info tells the unit, --unit sets it);"
-            f" turn {text} into that unit"
+            f"{needs} in the unit of the scan, without {found[1]} (info prints the unit, --unit sets it);"
+            f" convert {text} to that unit"
         )
     if re.search("[a-z]", text, re.IGNORECASE) and re.search(r"[./\\]", text):
         raise argparse.ArgumentTypeError(f"{needs}; there is no file {text}")
@@ -256,7 +256,7 @@ def _add_options(group: argparse._ArgumentGroup, specs: Iterable[Field[Any]]) ->
         elif spec.name in ("fixed_lines", "boundary"):
             options |= {"action": "append", "metavar": "FILE"}
             options["help"] += (
-                "; a text file of points X,Y,Z, an empty line or another `name` between two polylines; repeatable"
+                "; a text file of points X,Y,Z, with an empty line or a new `name` between polylines; repeatable"
             )
         elif spec.name == "symmetry":
             options["metavar"] = "auto|rotation|FILE"

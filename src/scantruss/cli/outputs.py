@@ -67,7 +67,7 @@ def outs_of(values: Namespace) -> list[Path]:
     words = [*([given] if isinstance(given, str) else given), *values.more_outs]
     if other := next((word for word in words if VALUE.match(word) and not SUFFIX.search(word)), None):
         raise UsageError(
-            f"{other} is no file to write; if it belongs to the option before it, separate its values by commas, without blanks"
+            f"{other} is not a file to write; if it belongs to the option before it, separate its values by commas, without blanks"
         )
     outs = [Path(word) for word in words]
     if not outs:

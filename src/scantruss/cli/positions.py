@@ -100,7 +100,7 @@ def _read_parts(path: str | Path, what: str) -> list[NamedPart]:
     except OSError as error:
         raise FormatError(f"cannot read {what} {path}: {error.strerror}") from None
     except UnicodeDecodeError:
-        raise FormatError(f"{path} is not a text file; {what} need a CSV file with three numbers a line") from None
+        raise FormatError(f"{path} is not a text file; {what} need a CSV file with three numbers per line") from None
     found: list[NamedPart] = []
     columns, named = [0, 1, 2], -1
     header = False
@@ -128,7 +128,7 @@ def _read_parts(path: str | Path, what: str) -> list[NamedPart]:
         begins = False
         found[-1][1].append((x, y, z))
     if not found:
-        raise FormatError(f"{path} holds no {what}; it needs three numbers X,Y,Z a line")
+        raise FormatError(f"{path} holds no {what}; it needs three numbers X,Y,Z per line")
     return found
 
 

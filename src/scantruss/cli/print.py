@@ -21,14 +21,12 @@ def print_parser() -> Parser:
     from .options import Parser, add_outs, number, scale
 
     usage = "GRID|STRUCTURE OUT.3mf|OUT.stl --member-diameter D --node-diameter D [--scale S] [--marks] [--bed WxDxH] [--sockets]"
-    said = (
-        "Make watertight solids, members and nodes, for a 3D printer: one, or parts with plug joints that fit its bed, or balls\n"
-        "with sockets for rods. Lengths are those of the model, in the unit of the grid."
+    about = (
+        "Make watertight solids of members and nodes for a 3D printer: one solid, or parts with plug joints that fit the bed,\n"
+        "or balls with sockets for rods. Lengths are those of the model, in the unit of the grid."
     )
-    parser = Parser("print", usage, said)
-    add_grid(
-        parser, "grid or structure saved as .json by scantruss grid or structure; lengths of a structure are metres"
-    )
+    parser = Parser("print", usage, about)
+    add_grid(parser, "grid or structure saved as .json by scantruss grid or structure (a structure is in metres)")
     add_outs(parser, "model, .3mf or .stl", "?")
     parser.add_argument(
         "--member-diameter",
@@ -42,19 +40,24 @@ def print_parser() -> Parser:
         "--scale", metavar="S", type=scale, default=1.0, help="scale of the model, 0.01 or 1:100 (default 1)"
     )
     parser.add_argument(
-        "--marks", action="store_true", help="engrave the marks of nodes on their balls, of members along them"
+        "--marks", action="store_true", help="engrave the marks of nodes on their balls, and of members along them"
     )
     parser.add_argument(
         "--bed",
         metavar="WxDxH",
         type=bed,
-        help="cut the model into parts that fit the bed, with plug joints, a file OUT_1, OUT_2, ... for each full bed",
+        help="cut the model into parts that fit the bed, with plug joints; each full bed is a file OUT_1, OUT_2, ...",
     )
     parser.add_argument(
-        "--sockets", action="store_true", help="a ball with sockets for each node, OUT_N001, ..., and a list of rods"
+        "--sockets",
+        action="store_true",
+        help="make a ball with sockets for each node, OUT_N001, ..., and a list of rods",
     )
     parser.add_argument(
-        "--clearance", metavar="C", type=number, help="between peg or rod and socket, all around (default 0.15 members)"
+        "--clearance",
+        metavar="C",
+        type=number,
+        help="gap between a peg or rod and its socket, all around (default 0.15 members)",
     )
     parser.add_argument("--keep-failed", action="store_true", help="also print a grid that failed its certificate")
     return parser
@@ -73,7 +76,8 @@ def print_solid(values: Namespace) -> None:
     """Make the printable model of a saved grid."""
     from ..export.printed.apart import print_apart
     from ..report.terminal import Bars, print_lines
-    from ..runtime.files import SaveTogether, check_place
+    from ..runtime.files import SaveTogether
+    from ..runtime.places import check_place
     from ..structure.layered import grid_in_metres
     from ..structure.truss import Truss
 

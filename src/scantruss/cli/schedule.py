@@ -28,17 +28,17 @@ def schedule_parser() -> Parser:
     parser = Parser(
         "schedule",
         "GRID|STRUCTURE OUT.xlsx|OUT.csv [OUT ...] [--tube DxT] [options]",
-        "List the nodes, members and panels of a grid or a structure as a workshop needs them, their types, quantities and\n"
-        "warnings; of a structure with forces, checks and bolts.\n"
-        "Lengths of tubes, balls, clearance and tolerance are millimetres of what is built.",
+        "List the nodes, members and panels of a grid or a structure as a workshop needs them, with types, quantities and\n"
+        "warnings; for a structure also forces, checks and bolts.\n"
+        "Tubes, balls, clearance and tolerance are in millimetres, as built.",
     )
     add_grid(parser, "grid or structure saved as .json by scantruss grid or structure")
-    add_outs(parser, "workbook .xlsx, or .csv: the members, the other tables beside it", "*")
+    add_outs(parser, "workbook .xlsx; or .csv: the members, with the other tables beside it", "*")
     parser.add_argument(
         "--tube",
         metavar="DxT",
         type=tube,
-        help="of a grid: outer diameter of the members, and wall, e.g. 114.3x5 [mm]",
+        help="for a grid: outer diameter and wall of the members, e.g. 114.3x5 [mm]",
     )
     parser.add_argument(
         "--ball",
@@ -50,7 +50,7 @@ def schedule_parser() -> Parser:
         "--clearance",
         metavar="C",
         type=number,
-        help="from where tubes meet to the ball, along a member [mm] (default D/10)",
+        help="distance along a member from where tubes meet to the ball [mm] (default D/10)",
     )
     parser.add_argument(
         "--tolerance", metavar="MM", type=number, help="largest misfit of equal members and panels (default 1)"
@@ -67,14 +67,14 @@ def schedule_parser() -> Parser:
         "--density",
         metavar="KG/M3",
         type=number,
-        help="density of members and balls, for masses, e.g. 7850; of a structure that of the balls",
+        help="density of members and balls, for masses, e.g. 7850; for a structure that of the balls",
     )
-    parser.add_argument("--bolts", metavar="GRADE", help="of a structure: 4.6, 5.6, 6.8, 8.8, 10.9 (default) or none")
+    parser.add_argument("--bolts", metavar="GRADE", help="for a structure: 4.6, 5.6, 6.8, 8.8, 10.9 (default) or none")
     parser.add_argument(
         "--thread", metavar="X", type=number, help="depth of a thread over the diameter of its bolt (default 1.1)"
     )
     parser.add_argument(
-        "--sleeve", metavar="X", type=number, help="diameter around a sleeve over that of its bolt (default 1.8)"
+        "--sleeve", metavar="X", type=number, help="outer diameter of a sleeve over that of its bolt (default 1.8)"
     )
     parser.add_argument(
         "--origin",
@@ -83,18 +83,18 @@ def schedule_parser() -> Parser:
         help="origin of the building frame in the scan (default: lowest corner)",
     )
     parser.add_argument(
-        "--rotation", metavar="DEG", type=number, help="from the scan's x axis to the building's, about z"
+        "--rotation", metavar="DEG", type=number, help="angle from the scan's x axis to the building's, about z"
     )
     parser.add_argument(
         "--least-angle", metavar="DEG", type=number, help="warn of smaller angles between members (default 30)"
     )
     parser.add_argument(
-        "--least-fold", metavar="DEG", type=number, help="warn of sharper folds, 180 is level (default 150)"
+        "--least-fold", metavar="DEG", type=number, help="warn of sharper folds; 180 is level (default 150)"
     )
     parser.add_argument(
-        "--slenderness", metavar="X", type=number, help="of a structure: warn of more slender members (default 200)"
+        "--slenderness", metavar="X", type=number, help="for a structure: warn of more slender members (default 200)"
     )
-    parser.add_argument("--keep-failed", action="store_true", help="also take a grid that failed its certificate")
+    parser.add_argument("--keep-failed", action="store_true", help="also accept a grid that failed its certificate")
     return parser
 
 
@@ -120,7 +120,8 @@ def make_schedule(values: Namespace) -> None:
     from dataclasses import fields
 
     from ..report.terminal import Bars, print_lines
-    from ..runtime.files import SaveTogether, check_place
+    from ..runtime.files import SaveTogether
+    from ..runtime.places import check_place
     from ..schedules.files import SCHEDULE_SUFFIXES, schedule_paths, write_schedules
     from ..schedules.settings import ScheduleSettings
 

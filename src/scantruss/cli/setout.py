@@ -30,24 +30,24 @@ def setout_parser() -> Parser:
         "setout",
         "GRID|STRUCTURE OUT.dxf|OUT.pdf|OUT.csv|OUT.xlsx [OUT ...] [--supports WHERE, of a GRID only] [options]",
         "Set out a grid or a structure: supports, heights along sections, unrolled boundaries, a plan with marks, and the\n"
-        "assembly by rings from the supports, each step stable or with the nodes that need props.\n"
-        "A structure has supports, joints, scale and unit of its own: give them for a grid only.\n"
-        "Lengths that are not of the scan are millimetres of what is built.",
+        "assembly by rings from the supports: each step is stable, or the nodes that need props are named.\n"
+        "Give supports, joints, scale and unit for a grid only: a structure has its own.\n"
+        "Lengths are in millimetres, as built, unless they are those of the scan.",
     )
     add_grid(parser, "grid or structure saved as .json by scantruss grid or structure")
-    add_outs(parser, "drawing .dxf or .pdf, tables .xlsx or .csv: the supports, the other tables beside it", "*")
+    add_outs(parser, "drawing .dxf or .pdf; tables .xlsx or .csv: the supports, with the other tables beside it", "*")
     units = "|".join(unit for unit in UNITS if unit)
-    for name, metavar, kind, said in (
-        ("supports", "WHERE", str, "of a grid: corners, boundary, lowest:H, fixed, ends, line:NAME, loop:N, N001, several joined by +"),
-        ("joints", "TYPE", str, "of a grid: rigid (default) or pinned, while it is put up"),
-        ("scale", "S", scale, "of a grid: size of the structure over that of the grid (default 1)"),
+    for name, metavar, kind, about in (
+        ("supports", "WHERE", str, "for a grid: corners, boundary, lowest:H, fixed, ends, line:NAME, loop:N, N001, or several joined by +"),
+        ("joints", "TYPE", str, "for a grid: rigid (default) or pinned, during assembly"),
+        ("scale", "S", scale, "for a grid: size of the structure over that of the grid (default 1)"),
         ("unit", units, str, "unit of a grid that has none"),
         ("origin", "X,Y,Z", position, "origin of the building frame in the scan (default: lowest corner)"),
-        ("rotation", "DEG", number, "from the scan's x axis to the building's, about z"),
-        ("spacing", "MM", number, "sections across x and y of the building frame, so far apart"),
+        ("rotation", "DEG", number, "angle from the scan's x axis to the building's, about z"),
+        ("spacing", "MM", number, "distance between sections across x and y of the building frame"),
         ("paper", "A4|A3|A2|A1|A0", str, "size of the pages of a .pdf (default A3)"),
     ):  # fmt: skip
-        parser.add_argument(f"--{name}", metavar=metavar, type=kind, default=SUPPRESS, help=said)
+        parser.add_argument(f"--{name}", metavar=metavar, type=kind, default=SUPPRESS, help=about)
     parser.add_argument(
         "--section",
         metavar="AXIS=MM",
@@ -55,9 +55,9 @@ def setout_parser() -> Parser:
         action="append",
         dest="sections",
         default=SUPPRESS,
-        help="section of the building frame, such as x=2500; again for more (default: the middle of x and of y)",
+        help="section of the building frame, such as x=2500; repeatable (default: the middle of x and of y)",
     )
-    parser.add_argument("--keep-failed", action="store_true", help="also take a grid that failed its certificate")
+    parser.add_argument("--keep-failed", action="store_true", help="also accept a grid that failed its certificate")
     return parser
 
 
@@ -114,9 +114,7 @@ def setout_lines(made: SettingOut) -> list[str]:
         f" {len(made.boundaries):,} {'boundary' if len(made.boundaries) == 1 else 'boundaries'} unrolled"
     ]
     loose = [(number, step.props) for number, step in enumerate(made.steps) if len(step.props)]
-    lines.append(
-        f"{len(made.steps):,} steps of assembly, {len(made.steps) - len(loose):,} of them stable by themselves"
-    )
+    lines.append(f"{len(made.steps):,} steps of assembly, {len(made.steps) - len(loose):,} of them stable on their own")
     before: list[int] = []
     for number, props in loose:
         if (now := props.tolist()) != before:
@@ -125,5 +123,5 @@ def setout_lines(made: SettingOut) -> list[str]:
             lines.append(f"from step {number} on {len(now):,} {'prop' if len(now) == 1 else 'props'}: {named}{more}")
         before = now
     if len(made.steps[-1].props):
-        lines.append("warning: the whole does not stand by itself; use more supports or rigid joints")
+        lines.append("warning: the whole does not stand on its own; use more supports or rigid joints")
     return lines

@@ -32,7 +32,7 @@ def add_memory(parser: Parser) -> None:
         "--memory",
         metavar="SIZE",
         type=size_of_memory,
-        help="memory that a scan may take, e.g. 4GB; a larger one is thinned (default: half of what is free)",
+        help="memory that a scan may take, e.g. 4GB; a larger scan is thinned (default: half of the free memory)",
     )
 
 
@@ -52,10 +52,10 @@ def read_scan(path: str, settings: Settings, bars: Bars) -> PointCloud:
 
 def report_cloud(bars: Bars, cloud: PointCloud | Thinned, name: str = "") -> None:
     """Report what was left out or converted, with the name of the cloud if it is one of several."""
-    said = list(cloud.notes)
+    notes = list(cloud.notes)
     if cloud.dropped:
-        said.append(f"{cloud.dropped:,} points with NaN or infinite coordinates are left out")
-    for note in said:
+        notes.append(f"{cloud.dropped:,} points with NaN or infinite coordinates are left out")
+    for note in notes:
         bars.note(note if name in note else f"{name}: {note}")
 
 
@@ -107,7 +107,7 @@ def read_thinned_scan(path: str, settings: Settings, bars: Bars) -> PointCloud:
     unit = f" {cloud.unit}" if cloud.unit else ""
     bars.note(
         f"thinned while it was read, from {read:,} points to {len(cloud.points):,}, in boxes of {settings.thin_spacing:g}{unit};"
-        " --thin-spacing 0 takes all"
+        " --thin-spacing 0 keeps all points"
     )
     return cloud
 
@@ -157,8 +157,9 @@ def note_corners(bars: Bars, cloud: PointCloud, settings: Settings) -> None:
     length, unit = length_that_shows_corners(beyond, settings.length), unit_words(cloud.unit)
     if length > settings.length:
         bars.note(
-            f"the points are random and end {words_of_number(beyond, 2)}{unit} before the boundary on the mean, so corners may be missed,"
-            f" and some may be none; longer members, from {round_length(length, 'up'):g}{unit}, show them better, and --boundary gives them"
+            f"the points are random and end on average {words_of_number(beyond, 2)}{unit} before the boundary, so"
+            f" corners may be missed or false; longer members, from {round_length(length, 'up'):g}{unit}, show them better,"
+            " and --boundary gives them"
         )
 
 

@@ -25,8 +25,8 @@ def splice_parser() -> Parser:
     parser = Parser(
         "splice",
         "SCAN SCAN [SCAN ...] -o OUT [options]",
-        "Put overlapping scans, each in a frame of its own, into one frame and merge them. The frame is that of the first\n"
-        "scan that fits. The poses, and how well every two scans agree, are saved beside OUT as .poses.json.",
+        "Move overlapping scans, each in its own frame, into one frame and merge them. The frame is that of the first scan\n"
+        "that fits. The poses, and how well each pair of scans agrees, are saved beside OUT as .poses.json.",
     )
     parser.add_argument("scans", metavar="SCAN", nargs="+", help="scan files, or patterns such as 'scans/*.ply'")
     add_outs(parser, "merged cloud; the suffix names the format")
@@ -36,7 +36,7 @@ def splice_parser() -> Parser:
     parser.add_argument(
         "--use-poses", action="store_true", help="take the poses as they are: no alignment, only residuals and merging"
     )
-    parser.add_argument("--all", action="store_true", help="refuse the whole run if any scan fits nowhere")
+    parser.add_argument("--all", action="store_true", help="fail if any scan fits nowhere")
     parser.add_argument("--unit", choices=[unit for unit in UNITS if unit], default="", help="unit of all scans")
     return parser
 
@@ -86,7 +86,7 @@ def names_of(files: list[Path]) -> list[str]:
 
 def check_outputs(values: Namespace) -> tuple[list[Path], Path]:
     """Return the clouds and the file of poses; what cannot be written is refused before anything is read or computed."""
-    from ..runtime.files import check_place
+    from ..runtime.places import check_place
 
     outs, taken = claim_clouds(values, "merged cloud")
     poses_file = check_place(outs[0].with_suffix(".poses.json"), (".json",))

@@ -20,18 +20,18 @@ if TYPE_CHECKING:
     from ..structure.options import StructureSettings
     from ..structure.path import Path as StructurePath
     from ..structure.report import StructureReport
-    from ..structure.statics import Solution
+    from ..structure.results import Solution
     from ..structure.truss import Truss
     from .options import Parser
 
 REPORT_SUFFIXES = (".html", ".pdf", ".png")  # of what a person reads; the others are those of `export.formats`
 OWN_OPTIONS = (  # name, metavar, help; the same names stand in a settings file
-    ("scale", "SCALE", "scale of the structure to the grid (default 1)"),
-    ("unit", "UNIT", "unit of the grid, where the grid does not know it: mm, cm, m, inch or foot"),
+    ("scale", "SCALE", "size of the structure over that of the grid (default 1)"),
+    ("unit", "UNIT", "unit of a grid that has none: mm, cm, m, inch or foot"),
     ("section", "NAME|FILE", "CHS114.3x5 (default), CFCHS114.3x5 (cold formed), SHS100x5, IPE200, HEA200, R100x200 or FILE.csv[:NAME]"),
     ("material", "NAME|FILE", "S235 to S460 (default S355), 6082-T6, C24, GL24h or FILE.csv[:NAME]"),
     ("supports", "WHERE|FILE",
-     "corners, boundary, lowest:H, fixed, ends, line:NAME, loop:N, a node such as N001, several joined by +, or a file of"
+     "corners, boundary, lowest:H, fixed, ends, line:NAME, loop:N, a node such as N001, or several joined by +; or a file of"
      " positions X,Y,Z in the frame of the scan"),
     ("support_type", "TYPE", "pinned (default), fixed, roller or springs:K, with K such as 5MN/m"),
     ("joints", "TYPE",
@@ -40,22 +40,22 @@ OWN_OPTIONS = (  # name, metavar, help; the same names stand in a settings file
      "such as self,cladding:0.5kN/m2,snow:1kN/m2,half-snow:1kN/m2,wind:0.8kN/m2:-0.7,temperature:30K, or a file with a list of"
      " loads (default self)"),
     ("node_allowance", "SHARE", "weight of the nodes over that of the members, such as 0.15 or 15%% (default 0)"),
-    ("double_layer", "DEPTH,...", "a second layer so far below, in metres of the structure or with a unit, and webs between; more"
-     " layers with more depths, as in 1.2,0.8"),
-    ("second_layer", "dual|same", "of a double layer: nodes under the triangles (default) or under the nodes"),
-    ("depth_along", "normal|vertical", "of a double layer: along the smoothed normals (default) or along z"),
-    ("held_layer", "outer|inner", "of a double layer: which one the supports hold (default outer, the grid)"),
-    ("layer_edges", "tapered|closed", "of a double layer: how it ends at the boundary (default tapered of the dual, else closed)"),
-    ("sharp_bends", "refuse|reduce", "of a double layer: what is done where the grid bends too sharply for its depth (default refuse)"),
-    ("size", "COUNT", "choose sections like --section until all members pass, and the structure buckles at 10 times its loads or more;"
-     " at most so many different ones"),
-    ("size_by", "WAY", "members (default), groups (boundary, lines, inner, of each piece) or rings: those of one get the same section"),
+    ("double_layer", "DEPTH,...", "add a second layer this far below, in metres of the structure or with a unit, and webs between; more"
+     " depths add more layers, as in 1.2,0.8"),
+    ("second_layer", "dual|same", "for a double layer: nodes under the triangles (default) or under the nodes"),
+    ("depth_along", "normal|vertical", "for a double layer: along the smoothed normals (default) or along z"),
+    ("held_layer", "outer|inner", "for a double layer: the one that is supported (default outer, the grid)"),
+    ("layer_edges", "tapered|closed", "for a double layer: how it ends at the boundary (default tapered for dual, closed for same)"),
+    ("sharp_bends", "refuse|reduce", "for a double layer: what to do where the grid bends too sharply for its depth (default refuse)"),
+    ("size", "COUNT", "choose sections like --section, at most this many different ones, until all members pass and the structure"
+     " buckles at 10 times its loads or more"),
+    ("size_by", "WAY", "members (default), groups (boundary, lines, inner, of each piece) or rings: what gets the same section"),
     ("buckling", "COUNT", "linear buckling factors of the combination that buckles first (default 0)"),
     ("frequencies", "COUNT", "lowest natural frequencies (default 0)"),
     ("path", "worst|NAME", "geometrically nonlinear path of a load case or combination; worst is the one that buckles first"),
-    ("path_steps", "COUNT", "steps of the path at most (default 30)"),
+    ("path_steps", "COUNT", "most steps of the path (default 30)"),
     ("path_factor", "NUMBER", "load factor at which the path ends (default twice the linear buckling factor)"),
-    ("imperfection", "KIND", "of the path: mode (default, span/300), mode:30mm, scan (the scan against its fair surface), none"),
+    ("imperfection", "KIND", "for the path: mode (default, span/300), mode:30mm, scan (the scan against its fair surface), none"),
 )  # fmt: skip
 
 
@@ -70,18 +70,22 @@ def structure_parser() -> Parser:
     )
     add_grid(parser, "grid saved as .json by scantruss grid")
     add_outs(
-        parser, "structure with its results; the suffix names the format; report to read .html .pdf, picture .png", "*"
+        parser,
+        "structure with its results; the suffix names the format; .html and .pdf are reports, .png a picture",
+        "*",
     )
-    parser.add_argument("--report", metavar="FILE", help="figures as .json, in m, N and kg; a page to read as .html")
+    parser.add_argument("--report", metavar="FILE", help="figures as .json, in m, N and kg, or a page as .html")
     parser.add_argument(
-        "--settings", metavar="FILE", help="all of this in a .toml or .json file, and combinations and limits"
+        "--settings", metavar="FILE", help="all of these options in a .toml or .json file, with combinations and limits"
     )
-    for name, metavar, said in OWN_OPTIONS:
+    for name, metavar, about in OWN_OPTIONS:
         kind = {"NUMBER": number, "COUNT": whole_number, "SCALE": scale, "SHARE": share}.get(metavar, str)
-        parser.add_argument("--" + name.replace("_", "-"), metavar=metavar, type=kind, default=SUPPRESS, help=said)
+        parser.add_argument("--" + name.replace("_", "-"), metavar=metavar, type=kind, default=SUPPRESS, help=about)
     parser.add_argument("--path-plot", metavar="FILE.png", help="picture of the path: load factor against displacement")
-    parser.add_argument("--dry-run", action="store_true", help="say size and time of the path, and compute nothing")
-    parser.add_argument("--keep-failed", action="store_true", help="also take a grid that failed its certificate")
+    parser.add_argument(
+        "--dry-run", action="store_true", help="print the size and time of the path without computing it"
+    )
+    parser.add_argument("--keep-failed", action="store_true", help="also accept a grid that failed its certificate")
     return parser
 
 
@@ -89,7 +93,8 @@ def structure(values: Namespace) -> None:
     """Make the structure of a saved grid, solve it and save it."""
     from ..export.formats import STRUCTURE, check_output, model_of
     from ..report.terminal import Bars, print_lines, print_table
-    from ..runtime.files import SaveTogether, check_place
+    from ..runtime.files import SaveTogether
+    from ..runtime.places import check_place
     from .convert import claim_models, write_models
 
     outs = [check_output(out, STRUCTURE, also=REPORT_SUFFIXES) for out in outs_of(values)]
@@ -110,11 +115,11 @@ def structure(values: Namespace) -> None:
     from ..structure.doubts import support_words
     from ..structure.modes import vibration_modes, worst_buckling
     from ..structure.path_report import encode_path, path_expectation
-    from ..structure.report import (
+    from ..structure.report import report_structure
+    from ..structure.report_lines import (
         STRUCTURE_HEAD,
         half_lines,
         mode_lines,
-        report_structure,
         sizing_lines,
         structure_lines,
         unlisted_lines,
@@ -282,7 +287,7 @@ def _notes(settings: StructureSettings) -> list[str]:
     from ..structure.options import units_taken
 
     words = [str(load.get("load", "")) if isinstance(load, dict) else str(load) for load in settings.loads]
-    said = units_taken(settings.loads)
+    notes = units_taken(settings.loads)
     if any(word.startswith("wind:") and ":" not in word[5:] for word in words):
-        said += ["wind without a coefficient presses with 1.0 everywhere; give one, as in wind:0.8kN/m2:-0.7"]
-    return said
+        notes += ["wind without a coefficient presses with 1.0 everywhere; give one, as in wind:0.8kN/m2:-0.7"]
+    return notes

@@ -25,11 +25,17 @@ def studio_parser() -> Parser:
     parser.add_argument(
         "--project", metavar="FILE.scantruss", help="where the project is saved (default: NAME.scantruss here)"
     )
-    parser.add_argument("--port", metavar="NUMBER", type=whole_number, default=8080, help="default 8080; 0: a free one")
     parser.add_argument(
-        "--host", metavar="ADDRESS", default="127.0.0.1", help="address to listen on; beyond this machine a token is asked for"
+        "--port",
+        metavar="NUMBER",
+        type=whole_number,
+        default=8080,
+        help="port to listen on (default 8080); 0: any free one",
+    )
+    parser.add_argument(
+        "--host", metavar="ADDRESS", default="127.0.0.1", help="address to listen on; from other machines a token is needed"
     )  # fmt: skip
-    parser.add_argument("--no-open", action="store_true", help="open no browser")
+    parser.add_argument("--no-open", action="store_true", help="do not open a browser")
     add_force(parser)
     return parser
 
@@ -80,8 +86,8 @@ def project_of(values: Namespace) -> Path | None:
     FormatError, InputError
         Nothing can be saved there, or another file is there.
     """
-    from ..runtime.files import check_place
     from ..runtime.ours import check_ours
+    from ..runtime.places import check_place
 
     suffix, source = ".scantruss", None if values.source is None else Path(values.source)
     opens = source is not None and source.suffix.lower() == suffix
@@ -97,7 +103,7 @@ def project_of(values: Namespace) -> Path | None:
     if place != source and place.exists():
         if not values.force:
             raise InputError(
-                f"{place} is there already; open it with: scantruss studio {place}, or save elsewhere with --project"
+                f"{place} exists already; open it with: scantruss studio {place}, or save elsewhere with --project"
             )
         check_ours(place, "result")
     return place

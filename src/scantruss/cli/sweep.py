@@ -33,8 +33,8 @@ def sweep_parser() -> Parser:
         "sweep",
         "SCAN [--length 3,4,5] [--effort quick,normal ...] -o FOLDER [options]",
         "Make a grid for every combination of settings: a table and pictures, for choosing a design.\n"
-        "Every setting takes one value or several, separated by commas; the scan is read once. Without --length the length that\n"
-        "info suggests is taken.",
+        "Every setting takes one value or several, separated by commas; the scan is read once. Without\n"
+        "--length, the length that info suggests is used.",
     )
     parser.add_argument("scan", metavar="SCAN", help="scan file")
     parser.add_argument("-o", "--out", metavar="FOLDER", required=True, help="folder of the results")
@@ -102,8 +102,8 @@ def sweep(values: Namespace) -> None:
         if fitting.thin_spacing:
             thin = {"thin_spacing": fitting.thin_spacing}
             trials = [replace(trial, settings=trial.settings.replace(**thin)) for trial in trials]
-        said = note_compiling(bars)
-        with said, workers_of(values, bars, None if len(trials) > 1 else 1) as workers:
+        compiling = note_compiling(bars)
+        with compiling, workers_of(values, bars, None if len(trials) > 1 else 1) as workers:
             outcomes = make_grids(cloud, trials, workers, bars, variants)
         head, rows = head_of(varied, cloud.unit), rows_of(trials, outcomes)
         if not any(outcome.grid for outcome in outcomes):
@@ -159,8 +159,8 @@ def _lightest_line(trials: list[Trial], outcomes: list[Outcome]) -> list[str]:
 
 def claim_results(folder: Path, trials: list[Trial], taken: Taken, force: bool, more: tuple[str, ...] = ()) -> None:
     """Refuse a folder where a result cannot be written, or would replace something else."""
-    from ..runtime.files import check_place
     from ..runtime.ours import check_ours
+    from ..runtime.places import check_place
 
     names = (*SWEEP_FILES, *more, *(f"{trial.name}{end}" for trial in trials for end in (".json", ".png")))
     for name in names:

@@ -30,7 +30,10 @@ def thin_parser() -> Parser:
     add_outs(parser, "thinned scan; the suffix names the format")
     parser.add_argument("--spacing", metavar="S", type=number, required=True, help="side of a box [scan unit]")
     parser.add_argument(
-        "--keep", metavar="mean|nearest", default="mean", help="mean of a box (default), or the point nearest to it"
+        "--keep",
+        metavar="mean|nearest",
+        default="mean",
+        help="what is kept of a box: the mean of its points (default), or the point nearest to it",
     )
     parser.add_argument(
         "--boundary", dest="outermost", action="store_true", help="also keep the outermost points at the boundary"
@@ -45,7 +48,7 @@ def add_workers(parser: Parser) -> None:
     from .options import whole_number
 
     parser.add_argument(
-        "--workers", metavar="N", type=whole_number, help="worker processes on this machine; 1: only this process"
+        "--workers", metavar="N", type=whole_number, help="worker processes on this machine; 1: this process only"
     )
     parser.add_argument("--scheduler", metavar="ADDRESS", default="", help="Dask cluster, e.g. tcp://10.0.0.5:8786")
 

@@ -11,6 +11,7 @@ from ..boundary.polylines import POINTS_UNDER_LINE, corners_of_polyline, divide_
 from ..errors import InputError, unit_words, words_of_number
 from ..kernels.surface.local_surface import Surface
 from ..surface.samples import SurfaceSamples, distance_from_scan, narrow_surface
+from .fixed_nodes import place_text
 
 if TYPE_CHECKING:
     from ..settings import Settings
@@ -47,10 +48,6 @@ def add_polylines(network: Network, samples: SurfaceSamples, settings: Settings)
             network.add(part, ring, own, name=name)
 
 
-def _text(place: Sequence[float] | np.ndarray) -> str:
-    return "(" + ", ".join(f"{c:.10g}" for c in place) + ")"
-
-
 def _check_on_scan(
     given: np.ndarray, line: Sequence[Sequence[float]], number: int, samples: SurfaceSamples, length: float
 ) -> None:
@@ -60,7 +57,7 @@ def _check_on_scan(
         distance = distance_from_scan(samples.surface, place)
         if distance > 0.5 * length:
             raise InputError(
-                f"fixed line {number}, point {k + 1} {_text(line[k])} is {words_of_number(distance, 4)}{unit} away from the scan;"
+                f"fixed line {number}, point {k + 1} {place_text(line[k])} is {words_of_number(distance, 4)}{unit} away from the scan;"
                 f" it must lie within half a member, {0.5 * length:.4g}{unit}"
             )
 
@@ -84,7 +81,7 @@ def _onto_scan(points: np.ndarray, number: int, samples: SurfaceSamples, surface
         unit = unit_words(samples.unit)
         raise InputError(
             f"fixed line {number} leaves the scan by {words_of_number(float(gaps[away[0]]), 4)}{unit} near"
-            f" {_text(points[away[0]] + samples.origin)};"
+            f" {place_text(points[away[0]] + samples.origin)};"
             f" it must stay within half a member, {0.5 * length:.4g}{unit}: give it more points"
         )
     return feet

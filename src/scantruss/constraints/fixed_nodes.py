@@ -43,6 +43,6 @@ def check_positions(
     return relative
 
 
-def place_text(place: np.ndarray) -> str:
+def place_text(place: Sequence[float] | np.ndarray) -> str:
     """Return a place as words: its coordinates in brackets."""
     return "(" + ", ".join(f"{c:.10g}" for c in place) + ")"

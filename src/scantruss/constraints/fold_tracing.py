@@ -50,7 +50,7 @@ OFF_SCAN = 0.3  # a place farther from the scan than this has left it [member le
 LOOK_AROUND = 0.12  # radius within which the scan is looked for below a ridge [member lengths]
 SHARE_BELOW = 0.25  # share of that radius by which the scan may lie below a sharp ridge
 FAR_OFF = 0.08  # a place on a ridge farther from all points than this is moved to the nearest [member lengths]
-FEWEST_AROUND = 5  # fewest points from which it is told whether a place lies off them
+FEWEST_AROUND = 5  # fewest points that show whether a place lies off them
 PLACES_BETWEEN_CORNERS = (0.3, 0.5, 0.7)  # shares of the way between two corners at which a short ridge must be seen
 
 
@@ -250,12 +250,12 @@ CORNER_TURN = 25.0  # by how much a line turns more in a corner than before and 
 SHORTEST_LINE_OF_FOLDS = 1.0  # least length of a line of folds [member lengths]
 LEAST_FULL_LENGTH = 0.75  # least length of it with the full angle [member lengths]
 SHARPEST_FOLD_ANGLE = 125.0  # a surface that bends by more is not folded but turns back: two sheets [degree]
-SHARPEST_EDGE = 155.0  # the same where sharp edges of bodies are looked for [degree]
+SHARPEST_EDGE = 155.0  # most that a surface bends at a fold where sharp edges of bodies are looked for [degree]
 # median change of the bend from place to place, at most, of folds by up to 50 degrees and by 70 or more [degree]: blunt crests of nature
 # are as sharp as blunt ridges that were made, but not as even
 EVEN_FOLDS = (0.5, 3.5)
-BLUNT, ACUTE = 50.0, 70.0  # [degree]
-BY_NOISE = 0.2  # the same that noise explains, for the root of the gain 1 [radian]
+BLUNT, ACUTE = 50.0, 70.0  # angles of folds between which the allowed change of the bend grows [degree]
+BY_NOISE = 0.2  # change of the bend that noise explains, for the root of the gain 1 [radian]
 SURE_GAIN = 25.0  # median gain, at least (F statistic)
 
 

@@ -8,9 +8,8 @@ import numpy as np
 
 LONGEST_BRIDGE = 4.0  # longest gap over which the ends of two ridges are joined [member lengths]
 COSINE_TO_OTHER_END = 0.94  # least cosine of the angle between such an end and the way to the other
-RING_COSINE = (
-    0.8  # least cosine of the angle between the ends of one ridge and the way between them that makes it a ring
-)
+# least cosine of the angle between the ends of one ridge and the way between them that makes it a ring
+RING_COSINE = 0.8
 TOUCHING_GAP = 0.6  # gap below which only one of the ends must point to the other [member lengths]
 BLURRED_PLACES = 1  # places at an end that are left out, because the third side disturbs them
 AIM, FAR_AIM = 5, 10  # places from which the direction of an end is taken, and those of a straight ridge

@@ -1,4 +1,4 @@
-"""Where ridges come to the boundary: the end of the scan along the ridge tells the place better than the smoothed boundary does."""
+"""Where ridges come to the boundary: the end of the scan along the ridge gives the place better than the smoothed boundary does."""
 
 from __future__ import annotations
 
@@ -14,18 +14,17 @@ if TYPE_CHECKING:
     from .ridge_ends import Ridge
 
 BOUNDARY_REACH = 0.9  # a ridge that ends so near to the boundary comes to it [member lengths]
-RADIUS_OF_TUBE = (
-    0.12  # radius around the continuation of a ridge within which points tell where the scan ends [member lengths]
-)
+# radius around the continuation of a ridge within which points show where the scan ends [member lengths]
+RADIUS_OF_TUBE = 0.12
 PLACES_OF_DIRECTION = 3  # places from which the direction at the end of a ridge is taken
-# places at the end of a ridge from which its direction is told, and the last of them that are left out
+# places at the end of a ridge from which its direction is taken, and the last of them that are left out
 STEADY_PLACES_OF_DIRECTION, PLACES_LEFT_OUT = 9, 3
 # distance of a corner from the continuation of a ridge up to which the corner is kept [member lengths]
 CORNER_KEPT_WITHIN = 0.1
-DENSITY_REACH = 0.5  # how far back along the ridge points tell how dense they are [member lengths]
+DENSITY_REACH = 0.5  # how far back along the ridge the density of the points is measured [member lengths]
 LOOK_FORWARD = 2.0  # how far the scan may go on along it [member lengths]
 GAP_AT_END = 14.0  # a gap so many times as long as the usual one between points along the ridge is the end of the scan
-FEWEST_ALONG = 8  # fewest points from which that is told
+FEWEST_ALONG = 8  # fewest points from which that is taken
 BENDING_LENGTH = 1.0  # length over which the boundary is bent to the end of a ridge [member lengths]
 MOST_BENDING = 0.4  # the boundary is not bent by more than this [member lengths]
 
@@ -44,7 +43,7 @@ def with_ridge_ends(boundary: Boundary, ridges: list[Ridge], samples: SurfaceSam
 
 
 def _makes_for_corner(line: np.ndarray, loop: Loop, length: float) -> bool:
-    """Whether a ridge (K, 3), as far as it can be told some way back, makes for a corner of the boundary: then it is right."""
+    """Whether a ridge (K, 3), judged by its direction some way back, makes for a corner of the boundary: then it is right."""
     if not len(loop.corner_at) or len(line) < STEADY_PLACES_OF_DIRECTION:
         return False
     from_there = line[-PLACES_LEFT_OUT]
@@ -55,7 +54,7 @@ def _makes_for_corner(line: np.ndarray, loop: Loop, length: float) -> bool:
 
 
 def scan_end(line: np.ndarray, samples: SurfaceSamples, length: float) -> np.ndarray | None:
-    """Return where the scan ends (3,) along the continuation of a line (K, 3); None if that cannot be told."""
+    """Return where the scan ends (3,) along the continuation of a line (K, 3); None if too few points show it."""
     from_there = line[-1]
     ahead = from_there - line[max(len(line) - PLACES_OF_DIRECTION, 0)]
     size = float(np.linalg.norm(ahead))

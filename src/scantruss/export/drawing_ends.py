@@ -36,7 +36,7 @@ def check_ends(lines: np.ndarray, points: np.ndarray, reach: float, near: float,
     if len(apart):
         raise FormatError(
             f"{name} has {len(apart):,} pairs of ends within {near:.3g} of each other that are not joined, one at"
-            f" {place_of(points[apart[0, 0]])}; give a --merge beyond their distance, or draw them apart"
+            f" {place_of(points[apart[0, 0]])}; give a larger --merge than their distance, or draw them farther apart"
         )
     line, node = _beside(lines, points, tree, near)
     start, way = points[lines[line, 0]], points[lines[line, 1]] - points[lines[line, 0]]

@@ -71,14 +71,14 @@ def grid_of_drawing(drawing: Drawing, name: str, merge: float | None = None) -> 
     if not len(pairs):
         raise FormatError(f"{name} has no lines and no faces{drawing.left}; a grid needs them")
     if not np.isfinite(drawing.points[pairs]).all():
-        raise FormatError(f"{name} has an end that is no number; export it again")
+        raise FormatError(f"{name} has an end that is not a number; export it again")
     median = float(np.median(np.linalg.norm(drawing.points[pairs[:, 1]] - drawing.points[pairs[:, 0]], axis=1)))
     reach = MERGE * median if merge is None else merge
     points, number = _merged(drawing, np.unique(pairs), reach)
     if (short := number[pairs[:, 0]] == number[pairs[:, 1]]).any():
         where = place_of(drawing.points[pairs[short][0, 0]])
         raise FormatError(
-            f"{name} has {short.sum():,} lines or sides no longer than {reach:.3g}, one at {where}; take a smaller --merge"
+            f"{name} has {short.sum():,} lines or sides no longer than {reach:.3g}, one at {where}; use a smaller --merge"
         )
     lines = np.unique(np.sort(number[drawing.lines], axis=1), axis=0)
     far = float(np.abs(points).max()) > FAR

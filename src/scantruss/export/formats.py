@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import FormatError, InputError
 from ..grid.grid import Grid
-from ..runtime.files import check_place, nearest_suffix, suffix_of, write_files
+from ..runtime.files import write_files
 from ..runtime.memory import nothing_collected
+from ..runtime.places import check_place, nearest_suffix, suffix_of
 from ..scan.cloud import PointCloud
 from ..scan.formats.extras import need_library
 from ..settings import UNITS
@@ -26,7 +27,7 @@ from .style import PAGE_POINTS, FileStyle
 
 if TYPE_CHECKING:
     from ..structure.report import StructureReport
-    from ..structure.statics import Solution
+    from ..structure.results import Solution
     from .drawing_in import Drawing
 
 Encoder = Callable[[Model, Path, FileStyle], dict[Path, bytes]]
@@ -47,7 +48,7 @@ class FileFormat:
     needs_unit: bool = False  #: whether a grid without a unit is refused
     wants_system: bool = False  #: whether programs need the reference system to place it
     read: Callable[[Path], Model] | None = None
-    draw: Callable[[Path], Drawing] | None = None  #: reads lines and faces that others drew
+    draw: Callable[[Path], Drawing] | None = None  #: reads lines and faces from other programs
     library: str = ""  #: module that must be installed
     extra: str = ""  #: of pyproject.toml, which brings it
     reads_with: str = ""  #: module that must be installed to read; its extra is `extra`
@@ -225,7 +226,7 @@ def write(
     style: FileStyle | None = None,
     report: StructureReport | None = None,
 ) -> list[Path]:
-    """Write a grid or a structure; the suffix of the path tells the format.
+    """Write a grid or a structure; the suffix of the path names the format.
 
     Parameters
     ----------
@@ -236,7 +237,7 @@ def write(
     cloud : PointCloud, optional
         The scan, drawn in pictures.
     style : FileStyle, optional
-        Choices that formats leave: views and size of a picture, faces or lines in OBJ, decimal comma in CSV, bodies in IFC.
+        Choices that formats leave open: views and size of a picture, faces or lines in OBJ, decimal comma in CSV, bodies in IFC.
     report : StructureReport, optional
         Of a Solution: the utilization of its members.
 
@@ -262,20 +263,20 @@ def write(
 
 
 def read_model(path: str | Path, merge: float | None = None) -> Model:
-    """Read a grid or a structure; the suffix of the path tells the format.
+    """Read a grid or a structure; the suffix of the path names the format.
 
     Parameters
     ----------
     path : str or Path
-        A .json that `scantruss grid` or `scantruss structure` wrote, of which a structure with load cases is solved again; or lines
-        and faces that others drew: .obj, .ply, .dxf, .3dm, .ifc, .compas.json. The notes of the model say what is to be known of these.
+        A .json that `scantruss grid` or `scantruss structure` wrote (a structure with load cases is solved again), or lines and faces
+        from another program: .obj, .ply, .dxf, .3dm, .ifc, .compas.json. The notes of the model say what was found in these.
     merge : float, optional
-        Distance within which ends of such lines are one node; by default a thousandth of their median length.
+        Ends of such lines closer than this become one node; by default a thousandth of their median length.
 
     Raises
     ------
     FormatError
-        Unknown suffix, an extra that is not installed, or the file cannot be read or is no grid.
+        Unknown suffix, an extra that is not installed, the file cannot be read, or it is not a grid.
     """
     path = Path(path)
     known = {suffix: row for suffix, row in FORMATS.items() if row.read or row.draw}

@@ -24,7 +24,7 @@ RAMP = np.array(
     [(38, 130, 142), (94, 201, 98), (253, 200, 37), (200, 30, 30)], float
 )  #: of utilization 0, 1/3, 2/3, 1 and more
 FLOAT, UINT, BYTE = 5126, 5125, 5121  #: of glTF
-AS_POINTS, AS_TRIANGLES = 0, 4
+AS_POINTS, AS_TRIANGLES = 0, 4  # how glTF draws a primitive
 
 
 class _Buffer:

@@ -17,7 +17,7 @@ from .model import STATIONS_WRITTEN, line_loads, temperatures
 from .part21 import Ref, Word, typed
 
 if TYPE_CHECKING:
-    from ..structure.statics import CaseResult
+    from ..structure.results import CaseResult
     from ..structure.truss import LoadCase, Truss
 
 SOURCES = {"permanent": ".DEAD_LOAD_G.", "snow": ".SNOW_S.", "wind": ".WIND_W.", "temperature": ".TEMPERATURE_T."}
@@ -119,9 +119,11 @@ def _releases(ifc: Ifc, truss: Truss, nodes: list[Ref], members: list[Ref]) -> N
             )
 
 
-def _act(ifc: Ifc, name: str, mark: str, on: Ref, load: Ref, more: tuple[Any, ...], said: str | None = None) -> Ref:
+def _act(
+    ifc: Ifc, name: str, mark: str, on: Ref, load: Ref, more: tuple[Any, ...], description: str | None = None
+) -> Ref:
     """Add an action or a reaction on a node or a member, where it lies."""
-    act = ifc.root(name, name, mark, mark, said, None, None, None, load, *more)
+    act = ifc.root(name, name, mark, mark, description, None, None, None, load, *more)
     ifc.relate("IFCRELCONNECTSSTRUCTURALACTIVITY", f"{name} {mark}", on, act)
     return act
 
@@ -177,15 +179,15 @@ def _results(ifc: Ifc, case: CaseResult, group: Ref, nodes: list[Ref], members: 
     for node in np.flatnonzero(truss.supports.any(axis=1)).tolist():
         load = add("IFCSTRUCTURALLOADSINGLEFORCE", None, *case.reactions[node].tolist())
         mark = f"{case.name} {truss.node_marks[node]} reaction"
-        said = "force of the support on the structure"
-        acts.append(_act(ifc, "IFCSTRUCTURALPOINTREACTION", mark, nodes[node], load, (GLOBAL,), said))
+        description = "force of the support on the structure"
+        acts.append(_act(ifc, "IFCSTRUCTURALPOINTREACTION", mark, nodes[node], load, (GLOBAL,), description))
     forces = case.along[:, STATIONS_WRITTEN].tolist()
-    said = "forces on the face towards the end"
+    description = "forces on the face towards the end"
     for number, length in enumerate(truss.lengths.tolist()):
         values = [add("IFCSTRUCTURALLOADSINGLEFORCE", None, *each) for each in forces[number]]
         load = add("IFCSTRUCTURALLOADCONFIGURATION", None, values, ((0.0,), (length / 2,), (length,)))
         mark = f"{case.name} {truss.member_marks[number]} forces"
         more = (LOCAL, Word(".DISCRETE."))
-        acts.append(_act(ifc, "IFCSTRUCTURALCURVEREACTION", mark, members[number], load, more, said))
+        acts.append(_act(ifc, "IFCSTRUCTURALCURVEREACTION", mark, members[number], load, more, description))
     ifc.relate("IFCRELASSIGNSTOGROUP", f"results {case.name}", acts, None, found)
     return found

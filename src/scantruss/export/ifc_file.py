@@ -73,7 +73,7 @@ class Ifc(Part21):
         return self.add(name, ifc_guid(self.model.guid(f"ifc {kind}", mark)), None, *values)
 
     def relate(self, name: str, mark: str, *values: Any) -> Ref:
-        """Add a relation without name; `mark` tells it from others of its kind."""
+        """Add a relation without name; `mark` distinguishes it from others of its kind."""
         return self.root(name, name, mark, None, None, *values)
 
     def properties(self, name: str, mark: str, values: dict[str, Any], of: tuple[Ref, ...]) -> Ref:

@@ -17,9 +17,8 @@ from .drawing_in import Drawing
 
 PHYSICAL, ANALYTIC = ("IfcMember", "IfcBeam", "IfcColumn"), ("IfcStructuralCurveMember",)
 AXES, BODIES = ("Axis", "Reference", None), ("Body",)  #: identifiers of representations
-OUR_PANEL = (
-    "panel"  #: type of the plates that we write, whose faces say which members enclose a panel of more than four nodes
-)
+#: type of the plates that we write, whose faces say which members enclose a panel of more than four nodes
+OUR_PANEL = "panel"
 STRAIGHT = 1e-6  #: distance of a point of an axis from the line between its ends, over their distance, up to which it is straight
 
 Ends = tuple[np.ndarray, np.ndarray]

@@ -29,7 +29,7 @@ from ..settings import UNITS, Settings
 from .model import Model, model_of_grid, model_of_truss
 
 FORMAT = "scantruss-grid"
-FORMAT_VERSION = 1
+FORMAT_VERSION = 1  # of the files of grids; later ones are refused
 
 
 def encode_model(model: Model) -> bytes:
@@ -132,7 +132,7 @@ def read_grid(path: str | Path) -> Grid:
     Raises
     ------
     FormatError
-        The file cannot be read, or it is not a grid of ours.
+        The file cannot be read, or it is not one of our grids.
     """
     try:
         values = json.loads(Path(path).read_text(encoding="utf-8"), parse_constant=_refuse_constant)

@@ -24,7 +24,7 @@ from ..structure.layered import framework_of
 if TYPE_CHECKING:
     from ..scan.cloud import PointCloud
     from ..structure.report import StructureReport
-    from ..structure.statics import Solution
+    from ..structure.results import Solution
     from ..structure.truss import LoadCase, Truss
 
 
@@ -35,7 +35,7 @@ SYSTEM_CODE = re.compile(r"EPSG:\d{4,6}")
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """A grid or a structure as other programs take it; all lengths are in `unit`, up is z."""
+    """A grid or a structure as other programs need it; all lengths are in `unit`, up is z."""
 
     local: np.ndarray  #: (V, 3) float64, the nodes relative to `origin`
     origin: np.ndarray  #: (3,) float64, in the frame of the scan
@@ -208,7 +208,7 @@ def with_system(model: Model, system: str) -> Model:
         )
     if model.truss is not None and model.truss.scale != 1.0:
         raise FormatError(
-            f"the structure is {model.truss.scale:g} times its scan, so its coordinates are of no reference system"
+            f"the structure is {model.truss.scale:g} times its scan, so its coordinates are in no reference system"
         )
     grid = None if model.grid is None else model.grid.replace(system=system)
     truss = None if model.truss is None else model.truss.replace(system=system)

@@ -118,19 +118,19 @@ def _plain(words: str) -> str:
 
 def _head(truss: Truss) -> list[str]:
     """Return what a reader of the script should know."""
-    said = [
+    comments = [
         MARK,
         "units: m, N, kg; nodes and members are counted from 1, in the order of their marks; local z lies along the normal",
         *(f"load case {number}: {_plain(case.name)}" for number, case in enumerate(truss.cases, 1)),
     ]
     for each in truss.combinations:
         factors = " + ".join(f"{factor:g} {_plain(case)}" for case, factor in each.factors)
-        said.append(f"combination {_plain(each.name)}: {factors}")
+        comments.append(f"combination {_plain(each.name)}: {factors}")
     if any(case.temperature is not None or case.strain is not None for case in truss.cases):
-        said.append(
+        comments.append(
             "strains without force are forces E A strain at the ends: take that from the axial forces of such cases"
         )
-    return said
+    return comments
 
 
 def _words(truss: Truss) -> dict[str, str | int]:

@@ -20,7 +20,7 @@ from ..grid.grid import Grid
 from ..runtime.ours import MARK
 from ..scan.checks import usual_extent
 from ..scan.cloud import PointCloud
-from ..structure.report import use_words
+from ..structure.checks import use_words
 from .model import Model, model_of_grid
 from .page_tables import Pin, colorings_of, pins_of, tables_of
 from .style import PAGE_POINTS, FileStyle
@@ -177,8 +177,8 @@ def _certificate(model: Model, pins: Sequence[Pin]) -> str:
         return ""
     if (certificate := model.grid.certificate) is None:
         return "<h2>Certificate</h2><p>None: this grid was not checked against its scan.</p>"
-    said = [f"warning: the grid {warning.words}{near(warning.where)}" for warning in certificate.warnings]
-    words = [f'<p class="warn">{escape(each)}</p>' for each in said]
+    warnings = [f"warning: the grid {warning.words}{near(warning.where)}" for warning in certificate.warnings]
+    words = [f'<p class="warn">{escape(each)}</p>' for each in warnings]
     buttons = [
         f'<button class="place" data-place="{k}"><span>{k + 1} {escape(pin.words)}</span><span>{escape(pin.value)}</span></button>'
         for k, pin in enumerate(pins)

@@ -22,7 +22,7 @@ from .workbook import ROWS_OF_SHEET, encode_workbook
 
 if TYPE_CHECKING:
     from ..structure.catalogue import Material, Section
-    from ..structure.statics import CaseResult
+    from ..structure.results import CaseResult
     from ..structure.truss import LoadCase, Truss
 
 SAF_VERSION = "2.2.0"

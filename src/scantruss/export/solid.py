@@ -14,7 +14,8 @@ from ..grid.certificate import check_passed
 from ..grid.grid import Grid
 from ..grid.marks import member_marks, node_marks
 from ..layouts.framework import outer_normals
-from ..runtime.files import check_place, write_files
+from ..runtime.files import write_files
+from ..runtime.places import check_place
 from .engraving import engraved, engraved_member
 from .solid_files import Solid, encode_3mf, encode_stl
 
@@ -52,7 +53,7 @@ def print_model(
     marks : bool
         Engrave the mark of each node on its ball.
     keep_failed : bool
-        Print a grid that failed its certificate too.
+        Print a grid even if it failed its certificate.
 
     Returns
     -------
@@ -62,7 +63,7 @@ def print_model(
     Raises
     ------
     InputError
-        Diameters that do not suit the grid.
+        The diameters do not suit the grid.
     CertificateError
         The grid failed its certificate.
     FormatError

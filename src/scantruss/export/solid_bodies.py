@@ -66,7 +66,7 @@ def encode_stl_bodies(model: Model, style: FileStyle) -> bytes:
 def _bodies(model: Model, style: FileStyle, name: str) -> Bodies:
     bodies = bodies_of(model, style)
     if bodies is None or not len(model.members):
-        raise FormatError(f"{name} holds bodies, and nothing says how thick the members of a grid are; give --tube")
+        raise FormatError(f"{name} holds bodies, and the members of a grid have no thickness; give --tube")
     return bodies
 
 

@@ -181,7 +181,7 @@ def encode_stl(solid: Solid) -> bytes:
     Raises
     ------
     FormatError
-        Some vertices cannot be told apart in float32.
+        Some vertices are the same in float32.
     """
     vertices, together = put_on_lattice(solid)
     if together:

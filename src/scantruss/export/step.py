@@ -18,12 +18,12 @@ PREFIX = {"mm": ".MILLI.", "cm": ".CENTI.", "m": "$"}
 def encode_step(model: Model, style: FileStyle) -> bytes:
     """Return a STEP file: axes in the frame of the scan in the unit of the grid (inches and feet become metres), or bodies.
 
-    Bodies are in metres and relative to the origin, as kernels of CAD programs work to 1e-7 mm near 0; the product tells the origin.
+    Bodies are in metres and relative to the origin, as kernels of CAD programs work to 1e-7 mm near 0; the product has the origin.
 
     Raises
     ------
     FormatError
-        Bodies are asked for, and nothing says how thick the members of a grid are.
+        Bodies are asked for, and the members of a grid have no thickness.
     """
     return _encode_bodies(model, style) if style.step == "bodies" else _encode_axes(model)
 
@@ -31,9 +31,7 @@ def encode_step(model: Model, style: FileStyle) -> bytes:
 def _encode_bodies(model: Model, style: FileStyle) -> bytes:
     bodies = bodies_of(model, style)
     if bodies is None:
-        raise FormatError(
-            "STEP bodies need sections, and nothing says how thick the members of a grid are; give --tube"
-        )
+        raise FormatError("STEP bodies need sections, and the members of a grid have no thickness; give --tube")
     file = Part21(SCHEMA, "ScanTruss")
     context = _context(file, PREFIX["m"])
     members, balls = add_bodies(file, model, bodies)
@@ -105,12 +103,12 @@ def _context(file: Part21, prefix: str) -> Ref:
     )
 
 
-def _product(file: Part21, shape: Ref, said: str) -> None:
+def _product(file: Part21, shape: Ref, description: str) -> None:
     """Add what makes a product of a shape."""
     application = file.add("APPLICATION_CONTEXT", "automotive design")
     file.add("APPLICATION_PROTOCOL_DEFINITION", "international standard", "automotive_design", 2000, application)
     product = file.add(
-        "PRODUCT", "ScanTruss", "ScanTruss", said, (file.add("PRODUCT_CONTEXT", "", application, "mechanical"),)
+        "PRODUCT", "ScanTruss", "ScanTruss", description, (file.add("PRODUCT_CONTEXT", "", application, "mechanical"),)
     )
     file.add("PRODUCT_RELATED_PRODUCT_CATEGORY", "part", None, (product,))
     version = file.add("PRODUCT_DEFINITION_FORMATION", "", "", product)

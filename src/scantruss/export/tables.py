@@ -15,7 +15,7 @@ from .style import FileStyle
 from .workbook import encode_workbook
 
 if TYPE_CHECKING:
-    from ..structure.statics import Solution
+    from ..structure.results import Solution
     from ..structure.truss import LoadCase, Truss
 
 FORCE_HEADS = ("Fx [N]", "Fy [N]", "Fz [N]", "Mx [Nm]", "My [Nm]", "Mz [Nm]")

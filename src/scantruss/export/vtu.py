@@ -37,7 +37,7 @@ def encode_vtu(model: Model, style: FileStyle) -> bytes:
         "group": np.concatenate([model.group_of, np.full(panels, -1)]),
         "length": _of_members(model, model.lengths),
     }
-    said = [
+    comments = [
         MARK,
         f"unit: {model.unit or 'not known'}",
         "group: " + ", ".join(f"{k} {n}" for k, n in enumerate(model.groups)),
@@ -45,7 +45,7 @@ def encode_vtu(model: Model, style: FileStyle) -> bytes:
     if model.truss is not None:
         of_cells["section"] = np.concatenate([model.truss.section_of, np.full(panels, -1)])
         of_cells["area"] = _of_members(model, model.truss.of_section("area"))
-        said.append("section: " + ", ".join(f"{k} {each.name}" for k, each in enumerate(model.truss.sections)))
+        comments.append("section: " + ", ".join(f"{k} {each.name}" for k, each in enumerate(model.truss.sections)))
     if model.utilization is not None:
         of_cells["utilization"] = _of_members(model, model.utilization)
     if model.solution is not None:
@@ -56,7 +56,7 @@ def encode_vtu(model: Model, style: FileStyle) -> bytes:
             of_cells[f"axial force {case.name} [N]"] = _of_members(model, axial)
     parts = [
         '<?xml version="1.0" encoding="UTF-8"?>\n',
-        *(f"<!-- {NOT_IN_COMMENTS.sub('?', words)} -->\n" for words in said),
+        *(f"<!-- {NOT_IN_COMMENTS.sub('?', words)} -->\n" for words in comments),
         '<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" header_type="UInt64">\n<UnstructuredGrid>\n',
         f'<Piece NumberOfPoints="{len(model.local)}" NumberOfCells="{members + panels}">\n',
         *_section("Points", {"Points": model.nodes}),

@@ -187,7 +187,7 @@ class Certificate:
         if self.faults:
             return "FAILED: the grid " + "; ".join(f"{fault.words}{near(fault.where)}" for fault in self.faults)
         verdict = "passed with warnings" if self.warnings else "passed"
-        said = [
+        parts = [
             verdict + (f" (wider limits: {', '.join(self.widened)})" if self.widened else ""),
             "oriented manifold",
             f"{self.handles} handle{'s' * (self.handles > 1)}" if self.handles else "",
@@ -196,7 +196,7 @@ class Certificate:
             f" {words_of_number(self.reach, 3)} {self.unit}".rstrip(),
             f"irregular {self.irregular}, forced {self.irregular_forced}",
         ]
-        return ", ".join(word for word in said if word)
+        return ", ".join(word for word in parts if word)
 
 
 def _largest(spread: Spread | None) -> Worst | None:
@@ -221,7 +221,7 @@ def check_passed(grid: Grid, keep_failed: bool) -> None:
     """
     if grid.certificate is not None and not grid.certificate.passed and not keep_failed:
         words = " and ".join(fault.words for fault in grid.certificate.faults)
-        raise CertificateError(f"the grid failed its certificate: it {words}; --keep-failed uses it all the same", grid)
+        raise CertificateError(f"the grid failed its certificate: it {words}; --keep-failed uses it anyway", grid)
 
 
 def near(where: Place | None) -> str:

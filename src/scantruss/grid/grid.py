@@ -124,7 +124,7 @@ class Grid(GridTables):
         return image
 
     def show(self, cloud: PointCloud | None = None) -> Any:
-        """Return the grid as a view that a notebook shows: turn it, colour it, click for the row of a member; nothing is loaded.
+        """Return the grid as a view for a notebook: turn it, colour it, click for the row of a member; nothing is loaded from the network.
 
         Parameters
         ----------

@@ -13,7 +13,7 @@ from .tables import GridTables
 
 @dataclass(frozen=True)
 class Topology:
-    """What the grid is, apart from where it lies."""
+    """What the grid is, whatever its shape and place."""
 
     components: int
     boundary_loops: int

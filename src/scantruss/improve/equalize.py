@@ -18,7 +18,7 @@ import numpy as np
 from ..kernels.mesh.equalize import RELAXATION, settle_some
 from ..kernels.mesh.grid import Net
 from ..kernels.mesh.local_search import search, suit_nodes
-from ..kernels.mesh.partition import BETWEEN_HALVES
+from ..kernels.mesh.partition import BETWEEN_PARTS
 from ..kernels.mesh.trial import Scratch, total_energy
 from ..runtime.parallel import two_at_once
 from .flips import flip_by_angle
@@ -33,9 +33,9 @@ LAST_RELAXATION = 1.75  # over-relaxation of the last sweeps, which evens out lo
 MEAN_LENGTH_WEIGHT = 24.0  # energy per node of a mean length off the desired one, per square of its relative error
 LARGEST_SHARE = 0.1  # largest energy that an average node is assumed to have
 LOCAL_SEARCH_ROUNDS = 6  # most rounds of the local search
-NODES_SETTLED_IN_HALVES = 2500  # nodes from which on two halves settle at once; with fewer, waiting costs more
-SWEEPS_IN_HALVES = 2  # sweeps of the halves between two sweeps of the nodes between them
-NODES_SEARCHED_IN_HALVES = 200  # irregular nodes from which on two halves are searched at once
+NODES_SETTLED_IN_PARTS = 2500  # nodes from which on two parts settle at once; with fewer, waiting costs more
+SWEEPS_IN_PARTS = 2  # sweeps of the parts between two sweeps of the nodes between them
+NODES_SEARCHED_IN_PARTS = 200  # irregular nodes from which on two parts are searched at once
 FARTHEST_ON_THE_WAY = 0.5  # distance of a node from the centre of its patch that gets it a new one [member lengths]
 
 
@@ -65,13 +65,13 @@ def blank_scratch(mesh: WorkingMesh) -> Scratch:
 
 
 def independent_sets_of(net: Net) -> list[np.ndarray]:
-    """Return the nodes to settle: those of two halves, which may move at once, and those between; all in one for a small net."""
+    """Return the nodes to settle: those of two parts, which may move at once, and those between; all in one for a small net."""
     live = net.degree > 0
     every = np.flatnonzero(live)
-    if len(every) < NODES_SETTLED_IN_HALVES:
+    if len(every) < NODES_SETTLED_IN_PARTS:
         return [every]
     label = Partition(net, live).label[every]
-    return [every[label == part] for part in (0, 1, BETWEEN_HALVES)]
+    return [every[label == part] for part in (0, 1, BETWEEN_PARTS)]
 
 
 def settle(
@@ -88,7 +88,7 @@ def settle(
     """
     independent_sets = independent_sets_of(mesh.net) if independent_sets is None else independent_sets
     awake, count = np.ones(len(mesh.net.degree), np.int64), sum(map(len, independent_sets))
-    at_once = sweeps if len(independent_sets) == 1 else SWEEPS_IN_HALVES
+    at_once = sweeps if len(independent_sets) == 1 else SWEEPS_IN_PARTS
 
     def move(some: np.ndarray) -> tuple[float, int]:
         of_grid = mesh.net, mesh.patches, mesh.curves, awake, some, mesh.length
@@ -110,18 +110,18 @@ def settle_again(mesh: WorkingMesh) -> None:
 def search_once(mesh: WorkingMesh, scratch: Scratch) -> int:
     """Try flips, collapses and splits at the nodes that ask for them; returns how many were kept.
 
-    If many ask, two halves of the grid are searched at once, then what lies between them.
+    If many ask, two parts of the grid are searched at once, then what lies between them.
     """
     net, kept = mesh.net, 0
     asking = (net.degree > 0) & (net.degree != net.ideal) & (scratch.tried[:] == 0)
-    if asking.sum() >= NODES_SEARCHED_IN_HALVES:
+    if asking.sum() >= NODES_SEARCHED_IN_PARTS:
         kept = _search_partition(mesh, Partition(net, asking), scratch)
     terms = terms_of(mesh, scratch)
     return kept + _search(mesh, net, scratch, terms)
 
 
 def _search_partition(mesh: WorkingMesh, partition: Partition, scratch: Scratch) -> int:
-    """Search both halves at once; each may add half of the nodes that bring the mean length to the desired one."""
+    """Search both parts at once; each may add half of the nodes that bring the mean length to the desired one."""
     terms = terms_of(mesh, scratch)
     terms = terms._replace(nodes=terms.nodes // 2)
     own = [blank_scratch(mesh), blank_scratch(mesh)]
@@ -150,6 +150,11 @@ def terms_of(mesh: WorkingMesh, scratch: Scratch) -> Terms:
     """Return the terms for a whole grid as it is now."""
     energy, mean, count = total_energy(mesh.net, mesh.patches, scratch, mesh.length, LENGTH_WEIGHT)
     return Terms(mean / mesh.length - 1.0, min(energy / max(count, 1), LARGEST_SHARE), max(count, 1))
+
+
+def energy_of_grid(mesh: WorkingMesh, scratch: Scratch) -> float:
+    """Return the energy of an opened grid with the usual weight of the lengths."""
+    return float(total_energy(mesh.net, mesh.patches, scratch, mesh.length, LENGTH_WEIGHT)[0])
 
 
 def energy_of_node(mesh: WorkingMesh) -> float:

@@ -9,10 +9,10 @@ from ..errors import InputError
 from ..kernels.boundary.curves import nearest_on_curves
 from ..kernels.mesh.grid import AT_REST, ON_CURVE, Net, may_split, split
 from ..kernels.mesh.point_location import nearest_sample
-from ..kernels.mesh.trial import Scratch, total_energy
+from ..kernels.mesh.trial import Scratch
 from ..kernels.surface.local_surface import NEAREST_SAMPLE
 from ..surface.samples import local_field
-from .equalize import FARTHEST_ON_THE_WAY, LENGTH_WEIGHT, new_scratch, search_once, settle
+from .equalize import FARTHEST_ON_THE_WAY, LENGTH_WEIGHT, energy_of_grid, new_scratch, search_once, settle
 from .working_mesh import WorkingMesh
 
 # distance from the boundary up to which a fixed node becomes a boundary node [member lengths]
@@ -106,7 +106,7 @@ def fix_nodes(mesh: WorkingMesh, positions: np.ndarray) -> None:
         for way in ways_to_place(mesh, place):
             mesh.restore(start)
             take_place(mesh, scratch, way, place)
-            energy = total_energy(mesh.net, mesh.patches, scratch, mesh.length, LENGTH_WEIGHT)[0]
+            energy = energy_of_grid(mesh, scratch)
             if energy < least:
                 best, least = mesh.copied(), energy
         if best is None:

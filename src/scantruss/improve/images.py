@@ -75,9 +75,9 @@ class Images:
         """Return the nodes (V, 3), each the mean of what its images say: the first of them, and exactly its images."""
         if not self.some:
             return nodes
-        said = np.einsum("mvi,mij->mvj", nodes[self.of] - self.centre, self.matrices)  # back by the transposes
+        turned_back = np.einsum("mvi,mij->mvj", nodes[self.of] - self.centre, self.matrices)  # back by the transposes
         first = self.of.min(axis=0)
-        mean = said.mean(axis=0)
+        mean = turned_back.mean(axis=0)
         which = np.argmax(
             self.of[:, first] == np.arange(len(nodes)), axis=0
         )  # the matrix that brings the first one here

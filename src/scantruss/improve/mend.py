@@ -13,8 +13,8 @@ import numpy as np
 from ..kernels.mesh.figures import angles_of, folds_of
 from ..kernels.mesh.grid import list_triangles
 from ..kernels.mesh.local_search import COLLAPSE, FLIP, SPLIT, is_allowed, make_move
-from ..kernels.mesh.trial import Scratch, gather, total_energy
-from .equalize import LENGTH_WEIGHT, new_scratch, settle
+from ..kernels.mesh.trial import Scratch, gather
+from .equalize import LENGTH_WEIGHT, energy_of_grid, new_scratch, settle
 from .fixed_nodes import RINGS_SETTLED, nodes_around
 from .working_mesh import WorkingMesh
 
@@ -98,11 +98,12 @@ def _mend(
     mesh: WorkingMesh, scratch: Scratch, triangle: tuple[int, int, int], poor: PoorPlaces, settings: Settings
 ) -> bool:
     """Make the move at a triangle that mends most; whether one does, else all is as before."""
-
-    def energy() -> float:
-        return float(total_energy(mesh.net, mesh.patches, scratch, mesh.length, LENGTH_WEIGHT)[0])
-
-    start, best, least, most = mesh.copied(), None, poor.faults - LEAST_MENDED, energy() + MENDING_ENERGY
+    start, best, least, most = (
+        mesh.copied(),
+        None,
+        poor.faults - LEAST_MENDED,
+        energy_of_grid(mesh, scratch) + MENDING_ENERGY,
+    )
     sides = list(zip(triangle, (*triangle[1:], triangle[0]), strict=True))
     moves = [(move, *side) for move in (FLIP, SPLIT, COLLAPSE) for side in sides]
     moves += [(COLLAPSE, b, a) for a, b in sides]
@@ -114,7 +115,7 @@ def _mend(
         near = nodes_around(mesh.net, added if added >= 0 else a, RINGS_SETTLED)
         settle(mesh, LENGTH_WEIGHT, 1e-4, SWEEPS_OF_TRIAL, independent_sets=[near])
         faults = poor_places(mesh, settings).faults
-        if faults < least and energy() < most:
+        if faults < least and energy_of_grid(mesh, scratch) < most:
             best, least = mesh.copied(), faults
         mesh.restore(start)
     if best is not None:

@@ -17,9 +17,8 @@ if TYPE_CHECKING:
 SHARE_OF_LIMIT = 0.95  # share of the largest distance allowed above which a node is put on the plane of its points
 FARTHEST_OFF = 0.6  # what is farther away is left to the certificate [member lengths]
 MOST_OFF = 60  # nodes that are put on the scan at most; more of them are no exception
-TURNS_OFF_SCAN = (
-    3  # times that they are, as other points are the nearest then; the last time on the nearest point itself
-)
+# times that they are, as other points are the nearest then; the last time on the nearest point itself
+TURNS_OFF_SCAN = 3
 
 
 def put_on_scan(mesh: WorkingMesh, samples: SurfaceSamples, settings: Settings) -> None:

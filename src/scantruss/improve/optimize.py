@@ -51,7 +51,7 @@ def optimize_grid(
     Parameters
     ----------
     grid : Grid
-        What the front has left.
+        What the front left behind.
     samples : SurfaceSamples
         The surface samples of the scan, of the same origin.
     boundary : Boundary

@@ -30,9 +30,9 @@ class Annealing(NamedTuple):
 
 
 PERTURBATIONS = {"quick": Annealing(0, 0.0), "normal": Annealing(6, 0.0), "best": Annealing(40, 0.2)}  # for each effort
-NODES_OF_LARGE_GRID = 700  # nodes above which `normal` perturbs once, in halves: there the boundary matters little
-HALVINGS = 2  # most times that a large grid is perturbed in halves
-IRREGULAR_NODES_FOR_HALVES = 12  # fewest irregular nodes for that
+NODES_OF_LARGE_GRID = 700  # nodes above which `normal` perturbs once, in parts: there the boundary matters little
+MOST_PARTITIONS = 2  # most times that a large grid is perturbed in parts
+IRREGULAR_NODES_FOR_PARTS = 12  # fewest irregular nodes for that
 HOT_ROUNDS = 0.8  # share of the rounds in which a perturbation may raise the energy
 ALLOWANCE_PER_TEMPERATURE = 5.0  # further energy that a perturbation may cost once searched [temperature of the round]
 
@@ -81,25 +81,25 @@ def search_widely(mesh: WorkingMesh, effort: str, progress: Callable[[float], No
 
 
 def perturb_in_parts(mesh: WorkingMesh) -> None:
-    """Perturb a large grid once at each irregular node, two halves at a time, and give up early on what will hardly pay.
+    """Perturb a large grid once at each irregular node, two parts at a time, and give up early on what will hardly pay.
 
-    What lies between the halves is perturbed in other halves, and the rest in the end.
+    What lies between the parts is perturbed in other parts, and the rest in the end.
     """
     net, waiting = mesh.net, np.ones(len(mesh.net.arc), np.bool_)
     rooms = [(new_scratch(mesh), new_area(mesh, number)) for number in range(3)]
 
     def perturb_both(partition: Partition) -> None:
         terms = terms_of(mesh, rooms[2][0])
-        terms = terms._replace(nodes=terms.nodes // 2)  # each half adjusts the mean length by itself
+        terms = terms._replace(nodes=terms.nodes // 2)  # each part adjusts the mean length by itself
         for side in (0, 1):
             rooms[side][1].out[:] = partition.label != side
         partition.run(
             lambda side: perturb(mesh, partition.nets[side], rooms[side], waiting, terms, 0.0, ALLOWANCE_SEARCHED)
         )
 
-    for _ in range(HALVINGS):
+    for _ in range(MOST_PARTITIONS):
         irregular = waiting & (net.degree > 0) & (net.degree != net.ideal)
-        if irregular.sum() >= IRREGULAR_NODES_FOR_HALVES:
+        if irregular.sum() >= IRREGULAR_NODES_FOR_PARTS:
             perturb_both(Partition(net, irregular))
     perturb(mesh, net, rooms[2], waiting, terms_of(mesh, rooms[2][0]), 0.0, ALLOWANCE_SEARCHED)
     mesh.renew(FARTHEST_ON_THE_WAY)

@@ -15,8 +15,8 @@ import numpy as np
 
 from ..kernels.boundary.curves import nearest_on_curves
 from ..kernels.mesh.distances import nearest_triangles, triangle_boxes
-from ..kernels.mesh.trial import Scratch, total_energy
-from .equalize import LENGTH_WEIGHT, new_scratch
+from ..kernels.mesh.trial import Scratch
+from .equalize import energy_of_grid, new_scratch
 from .fixed_nodes import take_place, ways_to_place
 from .working_mesh import WorkingMesh, close_net
 
@@ -29,9 +29,8 @@ LEAST_TIP = 0.32  # distance of a tip from the grid, at least [member lengths]
 FARTHEST_TIP = 1.2  # what is farther away is no tip but a part without a grid [member lengths]
 TIPS_APART = 1.0  # least distance between two tips [member lengths]
 TIP_TO_BOUNDARY = 0.5  # distance from the boundary within which no tip is looked for [member lengths]
-GIVEN_UP_WITHIN = (
-    1.5  # distance from a fault within which tips are given up, for each time that it came up [member lengths]
-)
+# distance from a fault within which tips are given up, for each time that it came up [member lengths]
+GIVEN_UP_WITHIN = 1.5
 MOST_TIPS = 40  # most tips at a time, the farthest first
 ENERGY_OF_TIP = 2.0  # most energy that a node on a tip may cost
 
@@ -88,16 +87,12 @@ def _is_at_boundary(mesh: WorkingMesh, place: np.ndarray, reach: float) -> bool:
 
 def _reach(mesh: WorkingMesh, scratch: Scratch, place: np.ndarray) -> bool:
     """Put a node on a tip in the way that costs the least energy; whether it costs little enough, else all is as before."""
-
-    def energy() -> float:
-        return float(total_energy(mesh.net, mesh.patches, scratch, mesh.length, LENGTH_WEIGHT)[0])
-
-    start, best, least = mesh.copied(), None, energy() + ENERGY_OF_TIP
+    start, best, least = mesh.copied(), None, energy_of_grid(mesh, scratch) + ENERGY_OF_TIP
     for way in ways_to_place(mesh, place):
         mesh.restore(start)
         take_place(mesh, scratch, way, place, around=True)
-        if energy() < least:
-            best, least = mesh.copied(), energy()
+        if energy_of_grid(mesh, scratch) < least:
+            best, least = mesh.copied(), energy_of_grid(mesh, scratch)
     mesh.restore(start if best is None else best)
     mesh.fixed[:] = start.fixed
     return best is not None

@@ -25,7 +25,7 @@ ROUNDS_OF_WAY = 25  #: after which another way is tried to come to fewer kinds
 MOST_ALIKE = 6000  #: any two of which are compared
 NEARLY_ALIKE = 0.1  #: of the tolerance, within which a part is taken to be its representative
 STIFFNESS_OF_NODE = 0.02  #: weight of staying where one is
-STIFFNESS_OF_PARTS = 0.004  #: the same over all that pulls at a node
+STIFFNESS_OF_PARTS = 0.004  #: weight of staying where one is, over all that pulls at a node
 STEP_OF_NODE = 0.05  #: farthest move of a node in one round, over the mean member
 WEIGHT_WITHIN = 0.3  #: weight of a part within the tolerance
 LEAST_MISFIT, MOST_MISFIT = 1e-4, 0.2  #: of parts that are alike
@@ -88,7 +88,7 @@ def check_alike(grid: Grid, tolerance: float, count: int, parts: str, number: in
     if len(grid.edges) == 0 or not grid.topology.manifold:
         raise InputError(f"few {parts} need a manifold grid with members")
     if number > MOST_ALIKE:
-        raise InputError(f"of {MOST_ALIKE:,} {parts} at most few kinds are made, got {number:,}")
+        raise InputError(f"few kinds are made of at most {MOST_ALIKE:,} {parts}, got {number:,}")
 
 
 def few_kinds(grid: Grid, parts: PartVectors, asked: Alike, progress: Progress | None = None) -> PartKinds:

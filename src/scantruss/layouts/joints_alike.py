@@ -13,9 +13,8 @@ from ..runtime.progress import Progress
 from .alike import PartKinds, check_alike, few_kinds
 from .part_vectors import PartVectors
 
-USUAL_UNEVENNESS = (
-    0.2  #: by how far lengths may be off the mean member, beside those that were before, over it; usually
-)
+#: by how far lengths may be off the mean member, beside those that were before, over it; usually
+USUAL_UNEVENNESS = 0.2
 MOST_UNEVEN = 0.9  #: that can be asked for
 HOLD_OF_LENGTH = 10.0  #: weight of what is beyond, over that of a direction
 

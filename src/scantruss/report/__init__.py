@@ -1,1 +1,1 @@
-"""What a run tells its user: figures, advice on lengths, the terminal, and the pages of a sweep."""
+"""What a run shows its user: figures, advice on lengths, the terminal, and the pages of a sweep."""

@@ -41,19 +41,8 @@ SHORTER_FIRST = (
 NEARLY_NEXT = 1.45  # ratio of lengths that pass up to which the longer one stands for the next to the shorter
 LINES_OF_A_SCANNER = 5  # fewest lines of points that may be those of a scanner
 NEXT_LENGTH = 1.4  # a length is suggested if that many times it passes too
-NEARBY_LENGTHS = (
-    1.12,
-    0.9,
-    1.25,
-    0.8,
-    1.4,
-    0.7,
-    1.7,
-    0.6,
-    2.0,
-    0.5,
-    2.8,
-)  # lengths that are tried in place of one that failed
+# lengths that are tried in place of one that failed
+NEARBY_LENGTHS = (1.12, 0.9, 1.25, 0.8, 1.4, 0.7, 1.7, 0.6, 2.0, 0.5, 2.8)
 # spacings in a member from which holes in the sampling are seldom taken for holes of the surface
 SURE_PER_SPACING = 8.0
 MOST_LOST = 0.01  # share of the scan that may be lost at a length that is suggested

@@ -55,8 +55,10 @@ def structure_table(
                 "" if each.buckling is None else f"{each.buckling:.3g}",
                 f"{1e3 * each.displacement:.3g}",
             )
-            said = each.fault or "; ".join(each.warnings) or "passed"
-            rows.append((*trial.varied, each.supports, f"{each.rise:g}", *(("",) * 5 if each.fault else figures), said))
+            verdict = each.fault or "; ".join(each.warnings) or "passed"
+            rows.append(
+                (*trial.varied, each.supports, f"{each.rise:g}", *(("",) * 5 if each.fault else figures), verdict)
+            )
     return (*varied, *STRUCTURE_COLUMNS), rows
 
 

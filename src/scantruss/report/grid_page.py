@@ -72,8 +72,8 @@ def _parts(grid: Grid, cloud: PointCloud, tables: Tables, command: str) -> Itera
         yield DataTable(("worst", "", "at"), tuple(certificate_rows(certificate)), words=(0, 2))
     yield SectionHead("Figures")
     yield DataTable(("", "before", "after optimization"), tuple(quality_rows(grid)))
-    said = grid_lines(grid, len(cloud.points))
-    yield PointList(tuple(words for words in said if not words.startswith(("certificate:", "warning:"))))
+    lines = grid_lines(grid, len(cloud.points))
+    yield PointList(tuple(words for words in lines if not words.startswith(("certificate:", "warning:"))))
     yield SectionHead("Plots")
     for kind, name, words in PLOTTED:
         column = _column(tables, kind, name)

@@ -46,19 +46,19 @@ def result_of(trial: LengthTrial | None) -> str:
     found = trial.grid.certificate if trial.grid is not None else None
     if found is None:
         return "passes"
-    said = ["passes with warnings" if found.warnings else "passes"]
+    parts = ["passes with warnings" if found.warnings else "passes"]
     shares: dict[str, float] = {}
     for part in found.left_out:
         if not part.asked and part.kind != "duplicates":
             shares[part.words] = shares.get(part.words, 0.0) + part.share
-    said += [
+    parts += [
         f"{share:.1%} {words}"
         for words, share in sorted(shares.items(), key=lambda kind: -kind[1])[:MOST_WORDS]
         if share >= 0.0005
     ]
     holes = sum(part.kind == "hole" for part in found.left_out)
-    said += [f"{holes} {'hole' if holes == 1 else 'holes'} closed"] * (holes > 0)
-    return ", ".join(said)
+    parts += [f"{holes} {'hole' if holes == 1 else 'holes'} closed"] * (holes > 0)
+    return ", ".join(parts)
 
 
 def _no_grid(trial: LengthTrial) -> str:
@@ -115,5 +115,5 @@ def passing_lines(trials: list[LengthTrial], unit: str) -> list[str]:
         begins = not trial.passed
     if not spans:
         return []
-    said = [f"{span[0]:g}" if len(span) == 1 else f"{span[0]:g} to {span[-1]:g}" for span in spans]
-    return [f"passes, of the {len(trials)} lengths tried: {', '.join(said)}{unit}"]
+    parts = [f"{span[0]:g}" if len(span) == 1 else f"{span[0]:g} to {span[-1]:g}" for span in spans]
+    return [f"passes, of the {len(trials)} lengths tried: {', '.join(parts)}{unit}"]

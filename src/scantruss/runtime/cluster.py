@@ -239,10 +239,10 @@ def _connect(scheduler: str) -> Any:
     try:
         return Client(scheduler, timeout=SECONDS_TO_ANSWER)
     except Exception as error:
-        said = " ".join(str(error).split())[:80] or type(error).__name__
-        said = said if isinstance(error, OSError | ValueError) else "something else answers there"
+        reason = " ".join(str(error).split())[:80] or type(error).__name__
+        reason = reason if isinstance(error, OSError | ValueError) else "something else answers there"
     gc.collect()  # the client that failed closes now: found later, while another starts, both would wait for one lock
-    raise InputError(f"no scheduler answers at {scheduler} ({said}); check the address")
+    raise InputError(f"no scheduler answers at {scheduler} ({reason}); check the address")
 
 
 def _version() -> str:

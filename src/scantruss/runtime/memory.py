@@ -8,11 +8,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-UNKNOWN_MEMORY = 4e9  # bytes, where a machine tells nothing
+UNKNOWN_MEMORY = 4e9  # bytes, where a machine reports nothing
 
 
 def available_memory() -> float:
-    """Return how many bytes of memory this process may still take, as far as the machine tells."""
+    """Return how many bytes of memory this process may still take, as far as the machine reports it."""
     found = [_meminfo(), _limit_of_group(), _limit_of_process()]
     return min((value for value in found if value is not None), default=UNKNOWN_MEMORY)
 
@@ -30,7 +30,7 @@ def nothing_collected() -> Iterator[None]:
 
 
 def _meminfo() -> float | None:
-    """What the machine has left; where it does not tell, half of all that it has."""
+    """What the machine has left; if it does not report that, half of all that it has."""
     with suppress(OSError, ValueError, IndexError):
         for line in Path("/proc/meminfo").read_text(encoding="ascii").splitlines():
             if line.startswith("MemAvailable:"):

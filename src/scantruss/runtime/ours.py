@@ -59,6 +59,6 @@ def check_ours(path: Path, kind: str) -> None:
     """
     if path.is_file() and kind_of_ours(path) != kind:
         raise FormatError(
-            f"{path} is there already and is no {kind} that ScanTruss wrote; name a new file, or add --force to replace it"
+            f"{path} exists already and is not a {kind} that ScanTruss wrote; name a new file, or add --force to replace it"
             " (what is read comes first, and a pattern such as *.ply needs quotes)"
         )

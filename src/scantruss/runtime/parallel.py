@@ -5,8 +5,10 @@ from __future__ import annotations
 import atexit
 import os
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from functools import cache
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
+from functools import cache, partial
 from queue import SimpleQueue
 from threading import Thread
 from typing import Any, TypeVar
@@ -90,6 +92,32 @@ def side_by_side(*works: Callable[[], Any]) -> tuple[Any, ...]:
 
     in_parts(len(works), 1, part, len(works))
     return tuple(results[k] for k in range(len(works)))
+
+
+def threaded_map(
+    work: Callable[[Share], Result], jobs: Sequence[Share], report: Callable[[float], None] | None
+) -> list[Result]:
+    """Return what the work returns for each job, in their order, with a thread for each processor.
+
+    For long jobs that use the threads of `in_parts` themselves. The share of the jobs that is done is reported; after an error no
+    further job begins.
+    """
+    done = []
+    workers = min(processors(), len(jobs))
+    with ExitStack() as stack:
+        results: Iterable[Result]
+        if workers < 2:
+            results = map(work, jobs)
+        else:
+            pool = stack.enter_context(ThreadPoolExecutor(workers))
+            futures = [pool.submit(partial(work, job)) for job in jobs]
+            stack.callback(lambda: [future.cancel() for future in futures])
+            results = (future.result() for future in futures)
+        for count, result in enumerate(results, 1):
+            done.append(result)
+            if report:
+                report(count / len(jobs))
+    return done
 
 
 @cache

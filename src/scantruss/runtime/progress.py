@@ -1,4 +1,4 @@
-"""How long work tells how far it is, and lets a front be seen while it advances."""
+"""How long work reports its progress, and lets a front be seen while it advances."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ class _State:
     """What is known of this process."""
 
     asked: int | None = None  #: the first signal that asked it to end
-    told = False  #: the line is out that says why it ends
+    told = False  #: whether the line that says why it ends is printed
     written = False  #: results have been put into place
     moving = threading.RLock()  #: held while results are put into place
 

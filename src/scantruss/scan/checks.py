@@ -26,9 +26,8 @@ NO_DATA_SHARES, FEWEST_NO_DATA = (0.002, 0.5), 20  # share and number of points 
 CLIFF_GAP = 0.1  # gap to the other heights, as a share of their range, that no terrain has
 STEEP_CLIFF = 10.0  # slope to the nearest others, in multiples of the usual one, that no shore has
 SOME_OF_RASTER = 20_000  # points of the rest that are looked at
-FAR_FROM_MIDDLE = (
-    10.0  # widths of the middle half of a scan from its middle, beyond which a place that many points share has no data
-)
+# widths of the middle half of a scan from its middle, beyond which a place that many points share has no data
+FAR_FROM_MIDDLE = 10.0
 SINGLE_STEP = 0.25  # step of coordinates in single precision from which a note says it [mean distances between points]
 MOST_INVALID_SHARE = 0.01  # share of the points that may be invalid; more are a fault of the file
 EXTENTS_READ = (1e-30, 1e30)  # of a scan in any unit; numbers with swapped bytes lie outside
@@ -97,7 +96,7 @@ def extent_note(files: Sequence[Path], extents: Sequence[np.ndarray]) -> tuple[s
     )
 
 
-def find_invalid(points: np.ndarray, lower: np.ndarray, upper: np.ndarray, said: str) -> np.ndarray | None:
+def find_invalid(points: np.ndarray, lower: np.ndarray, upper: np.ndarray, prefix: str) -> np.ndarray | None:
     """Return which points lie too far away to belong to the scan, (N,) bool; None if all belong to it.
 
     Parameters
@@ -105,7 +104,7 @@ def find_invalid(points: np.ndarray, lower: np.ndarray, upper: np.ndarray, said:
     points : (N, 3) float64 array
         Finite.
     lower, upper : their smallest and largest coordinates
-    said : start of the message
+    prefix : start of the message
 
     Raises
     ------
@@ -126,7 +125,7 @@ def find_invalid(points: np.ndarray, lower: np.ndarray, upper: np.ndarray, said:
     if count > max(MOST_INVALID_SHARE * len(points), most_no_data):
         most = np.abs(points[invalid]).max()
         raise InputError(
-            f"{said}{count:,} of {len(points):,} points lie a million times farther away than half of the scan is wide,"
+            f"{prefix}{count:,} of {len(points):,} points lie a million times farther away than half of the scan is wide,"
             f" with coordinates up to {most:.3g}; {CAUSE}"
         )
     return invalid
@@ -159,8 +158,8 @@ def find_no_data_place(points: np.ndarray, lower: np.ndarray, upper: np.ndarray)
 
 def no_data_place_note(count: int, place: np.ndarray) -> str:
     """Return a note on points that are left out for this."""
-    said = ", ".join(f"{coordinate + 0.0:.10g}" for coordinate in place)
-    return f"{count:,} points stand at ({said}), far from the others, as where there is no data, and are left out"
+    prefix = ", ".join(f"{coordinate + 0.0:.10g}" for coordinate in place)
+    return f"{count:,} points stand at ({prefix}), far from the others, as where there is no data, and are left out"
 
 
 def have_one_height(points: np.ndarray) -> bool:
@@ -233,10 +232,10 @@ def no_data_note(count: int, value: float) -> str:
     return f"{count:,} points have exactly z = {value:.10g}, a value for no data, and are left out"
 
 
-def check_sensible(extent: float, said: str) -> None:
+def check_sensible(extent: float, prefix: str) -> None:
     """Refuse an extent that no scan has."""
     if not EXTENTS_READ[0] <= extent <= EXTENTS_READ[1]:
-        raise InputError(f"{said}the points span {extent:.3g}, as no scan does; {CAUSE}")
+        raise InputError(f"{prefix}the points span {extent:.3g}, as no scan does; {CAUSE}")
 
 
 def single_precision_note(cloud: PointCloud) -> tuple[str, ...]:

@@ -94,7 +94,7 @@ class PointCloud:
         return measure_gap(self.points)
 
     def show(self) -> Any:
-        """Return the scan as a view that a notebook shows: turn it, come nearer; nothing is loaded."""
+        """Return the scan as a view for a notebook: turn it, zoom; nothing is loaded from the network."""
         return import_module("scantruss.export.page").view_of_cloud(self)  # a layer above this one
 
     @classmethod
@@ -113,7 +113,7 @@ class PointCloud:
         name : str
             File the points came from; messages start with it.
         normals : (N, 3) array, optional
-            Normals that came with the points: they tell the two sides of something thin apart.
+            Normals that came with the points: they distinguish the two sides of something thin.
 
         Returns
         -------
@@ -126,13 +126,13 @@ class PointCloud:
             Wrong shape, no numbers, too few points, all points on a line, or values that no scan has.
         """
         check_unit(unit)
-        said = f"{name}: " if name else ""
-        array = _as_coordinates(points, said)
-        clean, lower, upper = _drop_not_finite(array, said)
+        prefix = f"{name}: " if name else ""
+        array = _as_coordinates(points, prefix)
+        clean, lower, upper = _drop_not_finite(array, prefix)
         dropped, notes, left_out = len(array) - len(clean), tuple[str, ...](), tuple[tuple[str, int], ...]()
         if normals is not None and dropped:
             normals = normals[np.isfinite(array).all(axis=1)]
-        if (invalid := find_invalid(clean, lower, upper, said)) is not None:
+        if (invalid := find_invalid(clean, lower, upper, prefix)) is not None:
             notes = (invalid_values_note(clean[invalid]),)
             left_out = ((AT_NO_DATA if have_one_height(clean[invalid]) else INVALID, int(invalid.sum())),)
             clean = clean[~invalid]
@@ -151,10 +151,10 @@ class PointCloud:
             clean = np.ascontiguousarray(clean[~at])
             normals = normals if normals is None else normals[~at]
             lower, upper = bounds_of(clean)
-        extent = _check_extent(lower, upper, said)
+        extent = _check_extent(lower, upper, prefix)
         origin = _local_origin(lower, upper, extent)
         moved, sums = _moved(clean, origin)
-        _check_not_on_a_line(len(moved), sums, extent, said)
+        _check_not_on_a_line(len(moved), sums, extent, prefix)
         cloud = cls(
             moved, origin, unit=unit, dropped=dropped, left_out=left_out, name=name, notes=notes, normals=normals
         )
@@ -162,21 +162,21 @@ class PointCloud:
         return cloud
 
 
-def _as_coordinates(points: np.ndarray, said: str) -> np.ndarray:
+def _as_coordinates(points: np.ndarray, prefix: str) -> np.ndarray:
     """Return the points as an ordered (N, 3) float64 array, without a copy where they are one already."""
     try:
         array = np.asarray(points)
     except ValueError:
-        raise InputError(f"{said}points must have shape (N, 3), got rows of different lengths") from None
+        raise InputError(f"{prefix}points must have shape (N, 3), got rows of different lengths") from None
     if array.ndim != 2 or array.shape[1] != 3:
-        raise InputError(f"{said}points must have shape (N, 3), got {array.shape}")
+        raise InputError(f"{prefix}points must have shape (N, 3), got {array.shape}")
     if array.dtype.kind not in "fiu":
-        raise InputError(f"{said}points must be real numbers, got {array.dtype}")
+        raise InputError(f"{prefix}points must be real numbers, got {array.dtype}")
     with np.errstate(over="ignore", invalid="ignore"):
         return np.ascontiguousarray(array, np.float64)
 
 
-def _drop_not_finite(array: np.ndarray, said: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _drop_not_finite(array: np.ndarray, prefix: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the finite points with their lower and upper corner; refuse a cloud that is mostly not finite."""
     count = len(array)
     lower, upper = bounds_of(array)
@@ -184,12 +184,12 @@ def _drop_not_finite(array: np.ndarray, said: str) -> tuple[np.ndarray, np.ndarr
         array = array[np.isfinite(array).all(axis=1)]
         if 2 * len(array) < count:
             raise InputError(
-                f"{said}{count - len(array):,} of {count:,} points have NaN or infinite coordinates;"
+                f"{prefix}{count - len(array):,} of {count:,} points have NaN or infinite coordinates;"
                 " at least half must be finite, so check the export of the scan"
             )
         lower, upper = bounds_of(array)
     if len(array) < 3:
-        raise InputError(f"{said}at least 3 points are needed, got {len(array)}")
+        raise InputError(f"{prefix}at least 3 points are needed, got {len(array)}")
     return array, lower, upper
 
 
@@ -206,15 +206,15 @@ def bounds_of(array: np.ndarray) -> Bounds:
     return found[:, 0].min(axis=0), found[:, 1].max(axis=0)
 
 
-def _check_extent(lower: np.ndarray, upper: np.ndarray, said: str) -> float:
+def _check_extent(lower: np.ndarray, upper: np.ndarray, prefix: str) -> float:
     """Return the longest side of the cloud; refuse points that coincide or overflow."""
     largest = float(max(np.abs(lower).max(), np.abs(upper).max()))
     if largest > LARGEST_COORDINATE:
-        raise InputError(f"{said}coordinates must be smaller than {LARGEST_COORDINATE:g}, got {largest:.3g}; {CAUSE}")
+        raise InputError(f"{prefix}coordinates must be smaller than {LARGEST_COORDINATE:g}, got {largest:.3g}; {CAUSE}")
     extent = float((upper - lower).max())
     if extent <= max(4 * np.finfo(float).eps * largest, 1 / LARGEST_COORDINATE):
-        raise InputError(f"{said}all points are at the same place; a grid needs points spread over a surface")
-    check_sensible(extent, said)
+        raise InputError(f"{prefix}all points are at the same place; a grid needs points spread over a surface")
+    check_sensible(extent, prefix)
     return extent
 
 
@@ -241,7 +241,7 @@ def _moved(points: np.ndarray, origin: np.ndarray) -> tuple[np.ndarray, np.ndarr
     return moved, sums.sum(axis=0)
 
 
-def _check_not_on_a_line(count: int, sums: np.ndarray, extent: float, said: str) -> None:
+def _check_not_on_a_line(count: int, sums: np.ndarray, extent: float, prefix: str) -> None:
     """Refuse points whose spread across their main direction is rounding.
 
     A strip is at least about one spacing wide, that is 1 / N of its length; anything much narrower is a line.
@@ -251,7 +251,7 @@ def _check_not_on_a_line(count: int, sums: np.ndarray, extent: float, said: str)
     _, middle, largest = np.maximum(np.linalg.eigvalsh(covariance), 0.0)
     least = min(max(0.1 / count, 1e-6), 1e-3)
     if middle <= least * least * largest:
-        raise InputError(f"{said}all points lie on a line; a grid needs points spread over a surface")
+        raise InputError(f"{prefix}all points lie on a line; a grid needs points spread over a surface")
 
 
 def measure_spacing(points: np.ndarray, bounds: Bounds | None = None) -> float:
@@ -335,7 +335,7 @@ def _refine(
 
     Neighbours are sought in search boxes around the points of the sample, which grow until more than half of the sample have one
     (repeated points count each time); the others are farther away than the median. `some` distances to
-    the nearest of the sample (K,) tell where to begin.
+    the nearest of the sample (K,) say where to begin.
     """
     found = np.full(len(sample), math.inf)
     known = some[np.isfinite(some)]

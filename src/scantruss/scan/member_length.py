@@ -10,9 +10,8 @@ from ..settings import Settings, shortest_and_longest
 from .cloud import PointCloud, measure_gap
 
 LEAST_SPACINGS = 3.0  #: a member needs this many point spacings, or a boundary cannot be distinguished from a gap
-RANDOM_GAPS = (
-    1.75  # a member needs this many distances to the sixth neighbour, which for random points is more than the spacings
-)
+# a member needs this many distances to the sixth neighbour, which for random points is more than the spacings
+RANDOM_GAPS = 1.75
 USUAL_GAPS = 3.5  # distances to the sixth neighbour in a suggested length, which suits evenly meshed scans
 USUAL_MEMBERS = 25.0  #: members along the longest side of a scan, for a suggested length
 LARGEST_PER_EXTENT = 3.5  #: above this share of the scan's extent a grid says nothing of its shape

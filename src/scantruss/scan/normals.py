@@ -109,5 +109,5 @@ def check_two_sided(surface: Surface, thickness: np.ndarray) -> None:
     smooth = 0.15 * surface.step
     if kernels.head_on_links(surface.mean, surface.normals, surface.neighbors, thickness, smooth) >= HEAD_ON:
         raise OneSidedError(
-            "the scanned surface is one-sided (like a Moebius strip), a grid needs two sides; cut the scan into pieces"
+            "the scanned surface is one-sided (like a Moebius strip); a grid needs two sides; cut the scan into pieces"
         )

@@ -26,9 +26,8 @@ PLANE_STEPS = 10  #: Gauss-Newton steps of a plane
 NEAR_CELLS = 2.5  #: cells beyond which a reflected place has no counterpart
 IMAGE_QUANTILE = 0.95  #: of the places, which the misfit holds for
 MORE_PLANES = 0.25  #: of the tolerance, which planes besides the best must keep
-MOST_FOLD = (
-    3  #: mirror planes through one axis that are looked for: at 60 degrees rows of members run along all of them
-)
+#: mirror planes through one axis that are looked for: at 60 degrees rows of members run along all of them
+MOST_FOLD = 3
 LEAST_ACROSS_AXES = 0.3  #: sine of the angle of an axis to the normal of a plane through it, beyond which it is tried
 ROUGHLY = 20.0  #: tolerances within which a plane is worth refining
 CONFORMING = 2.0  #: by how far planes through one axis may be off equal angles [degree]

@@ -12,7 +12,7 @@ from ..settings import UNITS
 
 SAME_UNIT = 1e-5  # US survey feet are feet, to two parts in a million
 _NAMES = "mm|cm|m|inch|inches|foot|feet|ft|met(?:er|re)s?|millimet(?:er|re)s?|centimet(?:er|re)s?"
-_INCH = r"in(?![ \t]*[-:=]|[ \t]+\w)"  # told from the word by what follows: "the unit in this file is mm"
+_INCH = r"in(?![ \t]*[-:=]|[ \t]+\w)"  # distinguished from the word by what follows: "the unit in this file is mm"
 _GAP = r"[^\w\r\n]"
 PATTERN = rf"(?:units?|einheit){_GAP}{{0,3}}(?:in{_GAP}{{1,3}})?({_NAMES}|{_INCH})\b"  #: in a comment of a file
 _IN_NAME = re.compile(rf"[(\[<]\s*({_NAMES}|in)\s*[)\]>]$|[\s_]({_NAMES})$", re.IGNORECASE)  # x_in may be an input

@@ -11,8 +11,9 @@ from typing import Any
 from ..errors import FormatError
 from ..export.csv import encode_table
 from ..export.workbook import NOT_IN_XML, without_dates
-from ..runtime.files import check_place, write_files
+from ..runtime.files import write_files
 from ..runtime.ours import MARK
+from ..runtime.places import check_place
 from .records import Schedule, Schedules, Value, Workbook
 
 SCHEDULE_SUFFIXES = (".csv", ".xlsx")

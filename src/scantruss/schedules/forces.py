@@ -11,6 +11,7 @@ from ..errors import InputError
 from ..grid.grid import Grid
 from ..structure.layered import framework_of, grid_of_triangles
 from ..structure.report import report_structure
+from ..structure.results import MOMENT_Y, MOMENT_Z
 from ..structure.statics import solve
 
 if TYPE_CHECKING:
@@ -93,7 +94,7 @@ def find_forces(truss: Truss, order: np.ndarray, checked: Checked | None = None)
         less, more = result.axial[:, 0] < low, result.axial[:, 1] > high
         low[less], of_low[less] = result.axial[less, 0], number
         high[more], of_high[more] = result.axial[more, 1], number
-        moment = np.maximum(moment, np.hypot(result.along[:, :, 4], result.along[:, :, 5]).max(axis=1))
+        moment = np.maximum(moment, np.hypot(result.along[:, :, MOMENT_Y], result.along[:, :, MOMENT_Z]).max(axis=1))
         reaction = np.maximum(reaction, np.linalg.norm(result.reactions[:, :3], axis=1))
     if checked is None:
         report = report_structure(solution)

@@ -89,7 +89,7 @@ def check_grid(grid: Grid) -> None:
             f"the grid is {words}, so its nodes have no outer side; schedules need one that passes its certificate"
         )
     if not np.isfinite(grid.nodes[np.unique(grid.edges)]).all():
-        raise InputError("a node of the grid is nowhere (NaN); schedules need a grid that passes its certificate")
+        raise InputError("a node of the grid has no position (NaN); schedules need a grid that passes its certificate")
     if (short := np.flatnonzero(grid.lengths == 0.0)).size:
         raise InputError(f"member {member_marks(grid)[short[0]]} has no length; merge its nodes first")
     if (flat := np.flatnonzero((grid.angles == 0.0).any(axis=1))).size:

@@ -42,19 +42,19 @@ def schedule(
     Parameters
     ----------
     what : Grid or Truss
-        A grid, whose coordinates are multiplied by the scale of the settings, or a structure, which brings its size, sections,
-        material, marks and forces along.
+        A grid, whose coordinates are multiplied by the scale of the settings, or a structure, which has its own size, sections,
+        material, marks and forces.
     settings : ScheduleSettings
         Tubes of a grid, bolts of a structure, balls, tolerances, building frame, limits.
     keep_failed : bool
-        Take a grid that failed its certificate too.
+        Accept a grid that failed its certificate.
     checked : (utilization, governing), optional
-        Of the members of a structure; without it they are checked by default (`scantruss.structure.checks`).
+        Of the members of a structure; without it they are checked with the defaults (`scantruss.structure.checks`).
 
     Raises
     ------
     InputError
-        The unit is not known, the grid is no oriented manifold of members with a length, or the structure cannot be solved.
+        The unit is not known, the grid is not an oriented manifold of members with a length, or the structure cannot be solved.
     CertificateError
         The grid failed its certificate.
     """

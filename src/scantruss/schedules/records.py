@@ -83,7 +83,7 @@ class Workbook(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Schedules:
-    """All schedules of a grid; lengths are those of what is built, that is, scaled."""
+    """All schedules of a grid; lengths are as built, that is, scaled."""
 
     nodes: Schedule
     drilling: Schedule  #: the holes of each ball

@@ -27,7 +27,7 @@ LEAST_TOLERANCE = 1e-6  # below which rounding decides what is equal [mm, degree
 
 @dataclass(frozen=True, kw_only=True)
 class ScheduleSettings:
-    """Tubes and balls, tolerances, building frame and limits; lengths in millimetres of what is built.
+    """Tubes and balls, tolerances, building frame and limits; lengths in millimetres, as built.
 
     Raises
     ------

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from .parts import Parts
 
 DEGREE = "degree"
-LEAST_ACROSS = 1e-6  # of a normal across its member, below which nothing tells the twist
+LEAST_ACROSS = 1e-6  # of a normal across its member, below which the twist is undefined
 ENOUGH = 1000  # more than any bolt: stands for one that no bolt is large enough for
 
 

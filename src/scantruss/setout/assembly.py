@@ -21,8 +21,8 @@ from ..structure.substructures import factor_by_parts
 from ..structure.truss import LoadCase, Truss
 
 SHIFT = 1e-13  # of the scaled stiffness, so that a pivot that is nil does not end the elimination
-MOST_TIMES = 2.0  # moves of a step that stands, over those of the whole, ...
-MOST_MOVE = (0.01, 0.1)  # ... but neither less nor more than this over the median length of members
+MOST_TIMES = 2.0  # most that a step that stands moves, over the moves of the whole
+MOST_MOVE = (0.01, 0.1)  # least and greatest value of that limit, over the median length of members
 PROPS_APART = 3.0  # members between props that are set at once
 NONE = np.zeros(0, np.int64)  # no nodes
 LOOSE = 1e-9  # a smaller pivot of the scaled stiffness is one of a motion without resistance
@@ -47,7 +47,7 @@ def assembly_steps(truss: Truss, ring: np.ndarray, progress: Progress | None = N
     ring : (V,) int
         The step that adds each node, from 0; -1 for nodes without members.
     progress : callable, optional
-        Told what is done, and which share of it.
+        Called with what is done, and which share of it.
     """
     added = ring[truss.members].max(axis=1)
     _, moves = _stand(_part(truss, np.arange(len(added))), NONE, 0.0, give_up=True)

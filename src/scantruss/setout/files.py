@@ -11,8 +11,9 @@ import numpy as np
 
 from ..errors import FormatError, how_to_install
 from ..export.csv import encode_table
-from ..runtime.files import check_place, write_files
+from ..runtime.files import write_files
 from ..runtime.ours import MARK
+from ..runtime.places import check_place
 from ..schedules.files import encode_xlsx
 from .make import TABLES
 from .settings import PAPERS

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class SettingOut:
-    """All that is set out; places in the building frame [mm]."""
+    """Everything that is set out; places in the building frame [mm]."""
 
     grid: Grid
     unit: str  #: of the scan
@@ -54,18 +54,18 @@ def set_out(
     keep_failed: bool = False,
     progress: Progress | None = None,
 ) -> SettingOut:
-    """Return what is set out of a grid or a structure.
+    """Return the setting out of a grid or a structure.
 
     Parameters
     ----------
     what : Grid or Truss
-        Of a grid the settings name size and supports; a structure brings them along.
+        A grid, whose size and supports are in the settings, or a structure, which has its own.
     settings : SetoutSettings, optional
         Building frame, sections, paper.
     keep_failed : bool
-        Take a grid that failed its certificate too.
+        Accept a grid that failed its certificate.
     progress : callable, optional
-        Told what is done, and which share of it.
+        Called with what is done, and which share of it.
 
     Raises
     ------

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from ..errors import InputError
 
 PAPERS = {"A4": (297, 210), "A3": (420, 297), "A2": (594, 420), "A1": (841, 594), "A0": (1189, 841)}  #: ISO 216 [mm]
-MOST_SECTIONS = 200
+MOST_SECTIONS = 200  # sections above which their spacing is refused
 Cut = tuple[str, float]  # a vertical plane of the building frame: "x" or "y", and where [mm]
 
 

@@ -26,10 +26,8 @@ LAYERS = (
     GROUND_LINES,
 )
 BELOW, ROOM = 6.4, 22.0  # where heights are written, and room between rows, over the height of words
-BESIDE, LEADER = (
-    1.3,
-    1.2,
-)  # distance of words beside each other, and length of lines that lead to them, over the height of words
+# distance of words beside each other, and length of lines that lead to them, over the height of words
+BESIDE, LEADER = 1.3, 1.2
 WORD = 0.11  # height of marks over the median length of members, as they are seen in plan
 
 

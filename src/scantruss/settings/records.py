@@ -1,4 +1,4 @@
-"""The settings of each stage: every number that steers the method, with its symbol, unit, bounds, default and source.
+"""The settings of each stage: everything that can be set, with its symbol, unit, bounds, default and source.
 
 The options of the command line, the table in the docs and the JSON saved with each result are made from these fields.
 """
@@ -14,7 +14,7 @@ from ..errors import InputError
 from ..selection import FORMS, RETURNS
 
 SAMPLE_SPACING = 0.2  # spacing of the surface samples of a scan [member lengths]
-SMOOTH_SAMPLE_SPACING = 0.3  # the same for a dense, smooth scan [member lengths]
+SMOOTH_SAMPLE_SPACING = 0.3  # spacing of the surface samples of a dense, smooth scan [member lengths]
 HOLE = 4.0  # boundary length of the smallest hole worth keeping; the front runs over smaller ones [member lengths]
 CELLS = ("triangle", "quad", "hexagon")
 ROW_GUIDES = ("boundary", "curvature")
@@ -84,7 +84,7 @@ class MemberSettings(_Checked):
 
     length: float = _setting(
         0.0,
-        "desired member length; with a length field its shortest, and the whole field is scaled to it",
+        "desired member length; with a length field, its shortest length, to which the field is scaled",
         symbol="l_e",
         unit="scan unit",
         source="Eq. 10",
@@ -102,12 +102,12 @@ class MemberSettings(_Checked):
     )
     rows_along: Sequence[float] = _setting(
         (),
-        "an arrow along which rows of members run, as six numbers: a place on the scan and a direction, x y z dx dy dz; one"
+        "direction of the rows of members, as six numbers: a place on the scan and an arrow, x y z dx dy dz; one"
         " lattice is laid out instead of several (default method, triangles, one length)",
         unit="scan unit",
     )
     planar: bool = _setting(
-        False, "make quads or hexagons planar, as far as nodes within a tenth of a member of the scan allow it"
+        False, "make quads or hexagons planar, as far as nodes can stay within a tenth of a member of the scan"
     )
     method: str = _setting("default", "default: the improved method; paper: the paper to the letter", choices=METHODS)
     effort: str = _setting(
@@ -129,10 +129,12 @@ class ReadingSettings(_Checked):
     )
     z_unit: str = _setting(
         "",
-        "unit of the heights where it differs from that of x and y; they are converted",
+        "unit of the heights, if it differs from that of x and y; they are converted",
         choices=tuple(u for u in UNITS if u),
     )
-    classes: tuple[int, ...] = _setting((), "keep only these point classes, e.g. 6 or 2,6 (LAS, or a column named so)")
+    classes: tuple[int, ...] = _setting(
+        (), "keep only these point classes, e.g. 6 or 2,6 (LAS, or a column of that name)"
+    )
     returns: str = _setting("all", f"keep only these laser returns: {', '.join(RETURNS)} or a number from 1 to 15")
     confidence: float | None = _setting(None, "keep only points with at least this confidence (a property or column)")
     crop: tuple[str, ...] = _setting(
@@ -163,21 +165,21 @@ class CleaningSettings(_Checked):
     )  # fmt: skip
     keep_rods: bool = _setting(
         True,
-        "keep columns, scaffold and cables, thinner than a member; they are left out if no grid passes with them",
+        "keep columns, scaffold and cables, which are thinner than a member; they are left out if no grid passes with them",
     )
     limb_girth: float = _setting(
         3.0,
-        "cut off limbs, tails, handles and necks thinner than this, in member lengths around them; 0: never",
+        "cut off limbs, tails, handles and necks with a smaller girth than this, in member lengths; 0: never",
         low=0.0,
         high=6.0,
     )
     cut_thin: str = _setting(
-        "close", "what becomes of the ring where a thin limb is cut off: closed by a cap, or left open as a boundary",
+        "close", "what happens where a thin limb is cut off: the ring is closed by a cap, or left open as a boundary",
         choices=CUT_THIN,
     )  # fmt: skip
     piece: str = _setting(
         "auto",
-        "pieces of the scan to make a grid of: auto (all but a floor under the others), all, largest, or numbers such as 1 or 1,3",
+        "which pieces of the scan get a grid: auto (all but a floor under the others), all, largest, or numbers such as 1 or 1,3",
     )
     outlier_distance: float = _setting(
         3.0,
@@ -193,7 +195,7 @@ class SurfaceSettings(_Checked):
 
     box_size: float | None = _setting(
         None,
-        "spacing of the surface samples, in member lengths; none:"
+        "spacing of the surface samples, in member lengths; the search boxes that hold them are four times as wide; none:"
         f" {SAMPLE_SPACING:g}, or {SMOOTH_SAMPLE_SPACING:g} for a dense, smooth scan",
         source="Eq. 1",
         low=0.05,
@@ -202,19 +204,19 @@ class SurfaceSettings(_Checked):
     smooth_scale: float | None = _setting(
         None,
         "smooth away roughness and overhangs up to this size, in member lengths: nodes lie on the mean surface; 0: nothing;"
-        " none: 0.5, then 1, where no grid passes without",
+        " none: 0.5, then 1, if no grid passes without smoothing",
         low=0.0,
         high=2.0,
     )
     sharp_edges: bool = _setting(
         False,
-        "look for edges at which two sides of a body meet at less than some 60 degrees; tried by itself if no grid passes"
+        "look for edges at which two sides of a body meet at less than about 60 degrees; tried automatically if no grid passes"
         " (default method only)",
     )
     plain_body: bool = _setting(
         False,
         "take limbs thinner than 0.9 members off the body that the scan encloses, and fill slits narrower than 0.6 members;"
-        " tried by itself if no grid passes",
+        " tried automatically if no grid passes",
     )
 
 
@@ -231,7 +233,7 @@ class BoundarySettings(_Checked):
     )  # fmt: skip
     boundary: Sequence[Sequence[Sequence[float]]] = _setting(
         (),
-        "the true boundary, closed polylines that take the place of that of the scan; those inside others are holes",
+        "the true boundary: closed polylines that replace the boundary found in the scan; those inside others are holes",
         unit="scan unit",
     )
     fill_holes: float | None = _setting(
@@ -242,7 +244,7 @@ class BoundarySettings(_Checked):
         low=0.0,
     )
     fill_at: Sequence[Sequence[float]] = _setting(
-        (), "close the hole whose boundary passes each of these places, however long it is", unit="scan unit"
+        (), "close the hole whose boundary passes each of these places, however long the boundary is", unit="scan unit"
     )
 
 
@@ -255,11 +257,11 @@ class ConstraintSettings(_Checked):
     )
     fixed_lines: Sequence[Sequence[Sequence[float]]] = _setting(
         (),
-        "polylines that must become chains of members, in the frame of the scan; closed if the last point is the first",
+        "polylines that must become chains of members, in the frame of the scan; closed if the last point equals the first",
         unit="scan unit",
     )
     line_names: Sequence[str] = _setting(
-        (), "names of the fixed lines in their order, and so of the sets of their nodes; none: line 1, line 2, ..."
+        (), "names of the fixed lines, in their order, and of the sets of their nodes; none: line 1, line 2, ..."
     )
     symmetry: str | Sequence[Sequence[float]] = _setting(
         "",
@@ -280,7 +282,7 @@ class ConstraintSettings(_Checked):
         (), "do not follow the ridge that passes each of these places", unit="scan unit"
     )
     fold_weight: float = _setting(
-        0.0, "draw nodes to the crests of folds that are no ridges, even rounded ones, at the cost of even members; 1 is usual,"
+        0.0, "pull nodes onto the crests of folds that are not ridges, even rounded ones, at the cost of even members; 1 is usual,"
         " 0: off (default method only)", low=0.0, high=10.0,
     )  # fmt: skip
 
@@ -332,9 +334,13 @@ class SmoothingSettings(_Checked):
         source="Sec. 4.1 (c)",
         above=0.0,
     )
-    smooth_forward: float = _setting(0.6, "forward factor", symbol="lambda", source="Sec. 4.1, [34]", low=0.0, high=1.0)
-    smooth_backward: float = _setting(-0.1, "backward factor", symbol="mu", source="Sec. 4.1, [34]", low=-1.0, high=0.0)
-    smooth_passes: int = _setting(500, "most passes", source="Sec. 4.1", low=0, high=10_000)
+    smooth_forward: float = _setting(
+        0.6, "factor of the forward step", symbol="lambda", source="Sec. 4.1, [34]", low=0.0, high=1.0
+    )
+    smooth_backward: float = _setting(
+        -0.1, "factor of the backward step", symbol="mu", source="Sec. 4.1, [34]", low=-1.0, high=0.0
+    )
+    smooth_passes: int = _setting(500, "most passes of smoothing", source="Sec. 4.1", low=0, high=10_000)
 
 
 @dataclass(frozen=True, kw_only=True)

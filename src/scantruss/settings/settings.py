@@ -52,7 +52,7 @@ class Settings(
     ReadingSettings,
     MemberSettings,
 ):
-    """All settings of a run; `length` is needed, all else has a default. Impossible values raise `InputError`."""
+    """All settings of a run; `length` is required, everything else has a default. Impossible values raise `InputError`."""
 
     def __post_init__(self) -> None:
         """Check every value and bring positions, lines and lengths into their plainest form."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..errors import InputError
 from .catalogue import Material, Section
-from .statics import CaseResult
+from .results import MOMENT_Y, MOMENT_Z, SHEAR_Y, SHEAR_Z, CaseResult
 from .truss import Truss
 
 CLAUSES = (
@@ -26,6 +26,7 @@ CLAUSES = (
 )
 #: imperfection factors of the buckling curves, table 6.1
 IMPERFECTION = {"a0": 0.13, "a": 0.21, "b": 0.34, "c": 0.49, "d": 0.76}
+MOST_UTILIZATION = 1000  #: that is written as a number
 NO_BUCKLING = 0.2  #: relative slenderness up to which a member does not buckle, 6.3.1.2(4)
 
 
@@ -153,10 +154,10 @@ def utilizations(strength: Strength, result: CaseResult) -> np.ndarray:
     """
     low, high = result.axial.T
     tension, compression = np.maximum(high, 0.0), np.maximum(-low, 0.0)
-    shear = result.greatest[:, 1:3] / strength.shear
+    shear = result.greatest[:, [SHEAR_Y, SHEAR_Z]] / strength.shear
     cut = np.hypot(*shear.T)
     weaker = np.maximum(1 - np.where(cut > 0.5, (2 * cut - 1) ** 2, 0.0), 1e-9)  # 6.2.8(3)
-    bending = (result.greatest[:, 4:6] / strength.moment).sum(axis=1) / weaker
+    bending = (result.greatest[:, [MOMENT_Y, MOMENT_Z]] / strength.moment).sum(axis=1) / weaker
     axial = np.maximum(tension, compression) / strength.axial
     buckling = compression / strength.buckling
     plastic = np.array([cls < 3 for cls in strength.classes])[strength.truss.section_of]
@@ -166,8 +167,8 @@ def utilizations(strength: Strength, result: CaseResult) -> np.ndarray:
     weak = np.maximum(growth, np.minimum(2 * slender - 0.6, 1.4))  # k,zz of I sections
     growth = np.where(open_ & plastic, weak, growth)
     factor = 1 + np.maximum(growth, 0.0) * buckling
-    about_y = result.greatest[:, 4] / (strength.lateral * strength.moment[:, 0])
-    moments = (about_y + result.greatest[:, 5] / strength.moment[:, 1]) * strength.settings.gamma_m1
+    about_y = result.greatest[:, MOMENT_Y] / (strength.lateral * strength.moment[:, 0])
+    moments = (about_y + result.greatest[:, MOMENT_Z] / strength.moment[:, 1]) * strength.settings.gamma_m1
     moments /= strength.settings.gamma_m0
     both = np.where((compression > 0) | open_, buckling + factor * moments, 0.0)  # without compression 6.3.2
     return np.stack(
@@ -204,3 +205,10 @@ def _twisting_load(truss: Truss, length: np.ndarray) -> np.ndarray:
     of, material = truss.of_section, truss.material
     polar = (of("inertia_y") + of("inertia_z")) / of("area")
     return (material.shear * of("torsion") + math.pi**2 * material.young * of("warping") / length**2) / polar
+
+
+def use_words(utilization: float | None) -> str:
+    """Return a utilization in words: of absurd loads only that it is beyond all measure."""
+    if utilization is None:
+        return "-"
+    return f"{utilization:.2f}" if utilization <= MOST_UTILIZATION else f"> {MOST_UTILIZATION:g}"

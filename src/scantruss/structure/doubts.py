@@ -6,15 +6,13 @@ import numpy as np
 
 from .truss import Truss
 
-ONE_WAY, SIDEWAYS = (
-    0.6,
-    2.0,
-)  #: share of the surface that faces one way on the mean; ratio of its parts along x or y and along z: it may lie on its side
+#: share of the surface that faces one way on the mean; ratio of its parts along x or y and along z: it may lie on its side
+ONE_WAY, SIDEWAYS = 0.6, 2.0
 MANY_HELD = 0.8  #: share of the nodes of a structure from which supports are odd
 
 
 def support_words(truss: Truss) -> str:
-    """Return how many nodes are held, and how high they lie."""
+    """Return how many nodes are supported, and how high they lie."""
     held, used = _held(truss), np.unique(truss.members)
     z = truss.nodes[:, 2]
     low, high = (float(end) - float(z[used].min()) for end in (z[held].min(), z[held].max()))
@@ -30,11 +28,11 @@ def support_words(truss: Truss) -> str:
 
 def doubts_of(truss: Truss) -> list[str]:
     """Return warnings of a structure on its side, of supports that hold most of it, and of combinations that leave out something."""
-    said = _sideways(truss)
+    warnings = _sideways(truss)
     held, used = _held(truss), np.unique(truss.members)
     if len(held) > MANY_HELD * len(used):
-        said.append(
-            f"{len(held):,} of {len(used):,} nodes are held; heights of supports are in metres, or with a unit: lowest:50mm"
+        warnings.append(
+            f"{len(held):,} of {len(used):,} nodes are supported; heights of supports are in metres, or with a unit: lowest:50mm"
         )
     states = {each.state for each in truss.combinations}
     if truss.cases and truss.combinations and states != {"ULS", "SLS"}:
@@ -43,8 +41,10 @@ def doubts_of(truss: Truss) -> list[str]:
             if "SLS" not in states
             else "ULS, so members are checked for single cases"
         )
-        said.append(f"the combinations that were given have none of {missing}; those of EN 1990 are not added to them")
-    return said
+        warnings.append(
+            f"the combinations that were given have none of {missing}; those of EN 1990 are not added to them"
+        )
+    return warnings
 
 
 def _sideways(truss: Truss) -> list[str]:

@@ -10,7 +10,7 @@ from scipy.sparse import csc_matrix
 from scipy.spatial.transform import Rotation
 
 from .corotational import Answer, Members, Response, answer, respond
-from .frame import freedoms, member_freedoms
+from .frame import LENGTHEN, freedoms, member_freedoms
 from .mechanism import softest_motion
 from .statics import SINGULAR, Factored, dead_loads
 from .substructures import Factor, SingularError, Substructures
@@ -145,7 +145,7 @@ class Equilibrium:
         left = np.square(unbalanced / self.arms)
         free = float(left[self.free].sum())
         others = float(left.sum()) - free, float(np.square(state.factor * self.loads / self.arms).sum())
-        size = max(math.sqrt(max(*others, 0.0)), float(np.abs(response.natural[:, 0]).max()))
+        size = max(math.sqrt(max(*others, 0.0)), float(np.abs(response.natural[:, LENGTHEN]).max()))
         return math.sqrt(free) / size if size else 0.0
 
     def tangent(self, response: Response) -> Tangent:

@@ -20,7 +20,7 @@ def member_groups_of(truss: Truss, by: str = "groups") -> tuple[tuple[str, ...],
     Parameters
     ----------
     truss : Truss
-        Its triangles tell the boundary and what is on no panel, its sets of nodes the lines.
+        Its triangles give the boundary and what is on no panel, its sets of nodes the lines.
     by : str
         "groups": boundary, the lines of the grid by name, inner, and frame (on no panel), in each piece; top, bottom and web of a
         double layer.

@@ -21,11 +21,11 @@ from ..layouts.double_layer import Layers
 from ..runtime.ours import MARK
 from .catalogue import Material, Section
 from .report import StructureReport
-from .statics import Solution
+from .results import Solution
 from .truss import Combination, LoadCase, Truss
 
 STRUCTURE_FORMAT = "scantruss-structure"
-STRUCTURE_VERSION = 1
+STRUCTURE_VERSION = 1  # of the files of structures; others are refused
 ROW_A_LINE = (",\n", ": ")  #: separators of JSON that put each value of a plain list on a line of its own
 UNITS_WRITTEN = {"length": "m", "force": "N", "mass": "kg"}
 _ARRAYS = {  # of the record: columns and type
@@ -154,7 +154,7 @@ def read_structure(path: str | Path) -> Truss:
     Raises
     ------
     FormatError
-        The file cannot be read, or it is not a structure of ours.
+        The file cannot be read, or it is not one of our structures.
     """
     return read_checked(path)[0]
 
@@ -165,7 +165,7 @@ def read_checked(path: str | Path) -> tuple[Truss, tuple[np.ndarray, tuple[str, 
     Raises
     ------
     FormatError
-        The file cannot be read, or it is not a structure of ours.
+        The file cannot be read, or it is not one of our structures.
     """
     try:
         values = json.loads(Path(path).read_text(encoding="utf-8"))

@@ -41,18 +41,18 @@ class LayerChecks:
 
     def warnings(self, truss: Truss) -> list[str]:
         """Say how many there are, and the worst."""
-        said = []
+        found = []
         if len(self.clashes):
             a, b = self.clashes[int(self.clearances.argmin())].tolist()
             where = ", ".join(f"{c:.5g}" for c in _between(truss, a, b))
-            said.append(
+            found.append(
                 f"{len(self.clashes):,} pairs of members come closer than their diameters, the most {truss.member_marks[a]} and"
                 f" {truss.member_marks[b]}, {1e3 * self.clearances.min():.3g} mm apart at ({where})"
             )
         if len(self.sharp):
             a, b = self.sharp[int(self.angles.argmin())].tolist()
             steep = np.isin(self.sharp, _webs(truss)).all(axis=1).mean() > 0.5  # webs against webs, not against chords
-            said.append(
+            found.append(
                 f"{len(self.sharp):,} angles of webs to other members are below {LEAST_WEB_ANGLE:g} degrees, the least"
                 f" {self.angles.min():.3g} between {truss.member_marks[a]} and {truss.member_marks[b]};"
                 f" a {'smaller' if steep else 'larger'} depth opens them"
@@ -63,11 +63,11 @@ class LayerChecks:
                 for node in self.shallow[:PLACES_NAMED].tolist()
             )
             more = f" and {len(self.shallow) - PLACES_NAMED:,} more" if len(self.shallow) > PLACES_NAMED else ""
-            said.append(
+            found.append(
                 f"the depth is reduced where the grid bends sharply, to {truss.layers.share.min():.2g} of it at the least, at"
                 f" {named}{more}"
             )
-        return said
+        return found
 
 
 def _webs(truss: Truss) -> np.ndarray:

@@ -46,12 +46,8 @@ MOST_ALLOWANCE = 2  #: weight of the nodes over that of the members; more is a s
 LOAD_NAMES = ("self", "cladding", "snow", "half-snow", "wind", "temperature")
 LOAD_WORDS = "self, cladding:P, snow:P, half-snow:P, wind:P:C, temperature:T"
 ONCE = ("self", "snow", "temperature")  #: loads of which a second one is a slip
-HALF_SNOW_DIRECTIONS = (
-    0.0,
-    90.0,
-    180.0,
-    270.0,
-)  #: directions of half the snow, unless others are given [degree from x]
+#: directions of half the snow, unless others are given [degree from x]
+HALF_SNOW_DIRECTIONS = (0.0, 90.0, 180.0, 270.0)
 ALL_DIRECTIONS = tuple(30.0 * k for k in range(12))  #: those of `@all`
 MOST_COMBINATIONS = 200  #: made without being asked for one by one
 

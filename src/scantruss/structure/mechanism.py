@@ -70,7 +70,7 @@ def refuse_mechanism(truss: Truss, motion: np.ndarray) -> NoReturn:
     if len(loose):
         more = int((piece == loose[0]).sum()) - 1
         raise InputError(
-            f"a mechanism: the piece of the node {truss.node_marks[loose[0]]} and {more:,} more has no support; hold it too"
+            f"a mechanism: the piece of the node {truss.node_marks[loose[0]]} and {more:,} more has no support; support it too"
         )
     length = float(np.median(truss.lengths))
     moves = np.linalg.norm(motion[:, :3], axis=1)

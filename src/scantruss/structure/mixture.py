@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 MIXED_ITERATIONS = 6  #: iterations that are looked back on
-NIL = 1e-10  #: share of the largest singular value below which changes tell nothing
+NIL = 1e-10  #: share of the largest singular value below which changes are ignored
 
 
 class Mixture:

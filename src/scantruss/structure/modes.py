@@ -18,7 +18,8 @@ from ..errors import InputError
 from .frame import BEND_Y1, BEND_Z1, BOW, LENGTHEN, assemble, freedoms, inner_turns, member_freedoms, transforms
 from .lanczos import largest_eigenpairs
 from .mechanism import product
-from .statics import CaseResult, Factored, Solution
+from .results import CaseResult, Solution
+from .statics import Factored
 from .substructures import Factor, SingularError, factor_by_parts
 from .truss import GRAVITY, Truss
 
@@ -43,13 +44,13 @@ def buckling_modes(factored: Factored, result: CaseResult, count: int) -> Modes:
     """Return the smallest positive factors of a load case at which the structure buckles, by linear theory.
 
     The geometric stiffness is the consistent one (Przemieniecki, Theory of Matrix Structural Analysis, 15.2), with springs at the ends
-    condensed as in `frame`. Members within which half waves fit need nodes within them: here a member is one element, so that
+    condensed as in `frame`. Members that are long enough for half waves need nodes within them: here a member is one element, so that
     the buckling of single members is left to the check of EN 1993-1-1 6.3.1.
 
     Raises
     ------
     InputError
-        `count` is no positive number.
+        `count` is not a positive number.
     """
     truss = factored.truss
     matrices = _geometric(truss, result.natural[:, LENGTHEN])
@@ -64,7 +65,7 @@ def vibration_modes(factored: Factored, count: int) -> Modes:
     Raises
     ------
     InputError
-        `count` is no positive number.
+        `count` is not a positive number.
     """
     truss = factored.truss
     mass = np.zeros((len(truss.nodes), freedoms(truss)))

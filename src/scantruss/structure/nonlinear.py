@@ -17,6 +17,7 @@ from ..errors import InputError
 from ..runtime.progress import Progress
 from .corotational import Response
 from .equilibrium import Equilibrium, LoadedState, Tangent
+from .frame import LENGTHEN
 from .imperfections import Imperfection, imperfection_of
 from .mechanism import product
 from .mixture import Mixture
@@ -33,10 +34,8 @@ UNBUCKLED_FACTOR = 10.0  #: load factor at which a path ends that stays stable w
 BALANCED = 1e-9  #: error of equilibrium at which a step has converged
 ITERATIONS = 50  #: of a step at most
 WANTED_WORK = 11  #: iterations of a step, and four more for each tangent; more make the next shorter
-SMOOTH_STEP = (
-    0.8,
-    0.5,
-)  #: least cosine of a step to its start, greatest change of stiffness along it; else it is halved
+#: least cosine of a step to its start, greatest change of stiffness along it; else it is halved
+SMOOTH_STEP = (0.8, 0.5)
 SMOOTH_CUTS = 5  #: halvings of a step for that
 TANGENTS = 6  #: factored within a step at most
 ROUGH_GUESS = 0.2  #: error of a first guess above which the tangent of the state before is of no use
@@ -102,7 +101,7 @@ def solve_path(
         raise InputError(f"a path needs 1 step or more and a positive load factor, got {steps} and {stop_factor}")
     factored = factor_stiffness(truss)
     if factored.factor is None:
-        raise InputError("every node is held: there is no path of what cannot move")
+        raise InputError("every node is fixed, so nothing can move and there is no path")
     modes = buckling or _first_mode(factored, load)
     linear = float(modes.values[0]) if len(modes.values) else None
     case = combined_case(truss, modes.of)
@@ -227,7 +226,7 @@ class _Walk:
             factors=np.array([state.factor for state in self.states]),
             displacements=np.stack([state.displacements for state in self.states]),
             reactions=np.stack([balance.reactions(state, answer) for state, answer in pairs]),
-            axial=np.stack([answer.natural[:, 0] for answer in answers]),
+            axial=np.stack([answer.natural[:, LENGTHEN] for answer in answers]),
             equilibrium_errors=np.array(
                 [0.0] + [balance.error(*pair, balance.unbalanced(*pair)) for pair in pairs[1:]]
             ),

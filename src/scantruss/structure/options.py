@@ -1,4 +1,4 @@
-"""What `scantruss structure` can be told: one record, from options and from a readable file (TOML or JSON)."""
+"""What `scantruss structure` is asked for: one record, from options and from a readable file (TOML or JSON)."""
 
 from __future__ import annotations
 
@@ -126,7 +126,7 @@ def read_structure_settings(path: str | Path) -> StructureSettings:
 
 def units_taken(loads: str | Sequence[Any]) -> list[str]:
     """Return warnings of loads in tables that are numbers without a unit; people who write files think in kN."""
-    said = []
+    notes = []
     for table in loads:
         for kind, unit in (("force", "N"), ("line", "N/m"), ("settlement", "m"), ("lengthening", "m")):
             given = table.get(kind) if isinstance(table, Mapping) else None
@@ -136,10 +136,10 @@ def units_taken(loads: str | Sequence[Any]) -> list[str]:
                 if isinstance(value, int | float)
             ]
             if any(numbers):
-                said.append(
+                notes.append(
                     f'{kind} = {given!r} has no unit and is taken in {unit}; write it as "{max(numbers, key=abs):g}{unit}"'
                 )
-    return said
+    return notes
 
 
 def settings_text(settings: StructureSettings) -> str:

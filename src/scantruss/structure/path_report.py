@@ -51,19 +51,19 @@ def path_words(path: Path) -> str:
 
 def path_warnings(path: Path) -> list[str]:
     """Return what is to be known about a path."""
-    said = []
+    warnings = []
     if path.kind == "bifurcation":
         advice = "a larger imperfection" if path.imperfection.kind == "mode" else "an imperfection, such as mode"
-        said.append(
+        warnings.append(
             f"the path passes a bifurcation at the factor {path.limit_factor:.4g}: the structure leaves it there; take {advice}"
         )
     if path.limit_factor is not None and path.limit_factor < 1:
-        said.append(
+        warnings.append(
             f"the structure does not carry {path.name}: it loses its stability at {path.limit_factor:.3g} times it"
         )
     if path.limit_factor is None and "reached" not in path.ended:
-        said.append(f"the path found no limit: {path.ended}")
-    return said
+        warnings.append(f"the path found no limit: {path.ended}")
+    return warnings
 
 
 def path_expectation(truss: Truss, steps: int = PATH_STEPS) -> str:

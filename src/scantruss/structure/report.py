@@ -1,4 +1,4 @@
-"""The report of a structure: its figures as plain values, and in words."""
+"""The report of a structure: its figures as plain values."""
 
 from __future__ import annotations
 
@@ -10,18 +10,16 @@ from typing import Any
 import numpy as np
 
 from ..errors import words_of_number
-from .checks import CLAUSES, MemberChecks, span_of, strengths, utilizations
+from .checks import CLAUSES, MemberChecks, span_of, strengths, use_words, utilizations
 from .doubts import doubts_of
 from .groups import member_groups_of
 from .layers import LayerChecks, check_layers
 from .modes import Modes
 from .path import Path
-from .path_report import path_figures, path_warnings, path_words
+from .path_report import path_figures, path_warnings
+from .results import CaseResult, Solution
 from .sizing import SizingRound
-from .statics import CaseResult, Solution
 from .truss import Truss
-
-MOST_UTILIZATION = 1000  #: that is written as a number
 
 
 @dataclass(frozen=True)
@@ -137,19 +135,19 @@ def report_structure(
     Parameters
     ----------
     solution : Solution
-        Of `solve`.
+        Result of `solve`.
     checks : MemberChecks, optional
         Buckling length, partial factors, limits.
     notes : sequence of str
-        Warnings of whoever made the structure.
+        Further warnings, of whoever made the structure.
     buckling, vibration : Modes, optional
-        Of `worst_buckling` and `vibration_modes`.
+        Results of `worst_buckling` and `vibration_modes`.
     rounds : sequence of SizingRound
-        Of `size_members`.
+        Those of `size_members`.
     weights : dict of int to float, optional
-        Of `weight_curve`.
+        That of `weight_curve`.
     path : Path, optional
-        Of `solve_path`.
+        That of `solve_path`.
     """
     truss, checks = solution.truss, checks or MemberChecks()
     strength = strengths(truss, checks)
@@ -167,30 +165,30 @@ def report_structure(
             more = each.max(axis=1) > worst
             worst[more], clause[more], load[more] = each.max(axis=1)[more], each.argmax(axis=1)[more], number
     governing = tuple(f"{CLAUSES[c]}, {figures[k].name}" for c, k in zip(clause, load, strict=True))
-    said = [*truss.warnings, *doubts_of(truss), *notes]
+    warnings = [*truss.warnings, *doubts_of(truss), *notes]
     if not strength.known:
         why = "not steel" if truss.material.kind != "steel" else "of class 4 (EN 1993-1-1 table 5.2)"
-        said.append(f"no member is checked: {truss.material.name} {truss.sections[0].name} is {why}")
+        warnings.append(f"no member is checked: {truss.material.name} {truss.sections[0].name} is {why}")
     elif (over := int((worst > 1).sum())) > 0:
         most = int(worst.argmax())
         words = f"{truss.member_marks[most]} {use_words(worst[most])} by {governing[most]}"
-        said.append(
+        warnings.append(
             f"{over:,} of {len(worst):,} members {'is' if over == 1 else 'are'} used beyond 1, the most {words}"
         )
-    said += _limits(truss, figures, checks)
+    warnings += _limits(truss, figures, checks)
     if buckling is not None and (least := float(buckling.values.min(initial=math.inf))) < checks.buckling_factor:
         less = f"the structure buckles at {least:.3g} times {buckling.of}"
         enough = f"less than {checks.buckling_factor:g}: analysis of first order and its checks are not enough (EN 1993-1-1 5.2.1(3))"
-        said.append(f"{less}: it does not carry this load" if least < 1.0 else f"{less}, {enough}")
+        warnings.append(f"{less}: it does not carry this load" if least < 1.0 else f"{less}, {enough}")
     layers = check_layers(truss) if truss.member_sets else None
-    said += layers.warnings(truss) if layers is not None else []
-    said += path_warnings(path) if path is not None else []
+    warnings += layers.warnings(truss) if layers is not None else []
+    warnings += path_warnings(path) if path is not None else []
     return StructureReport(
         truss=truss,
         cases=tuple(figures),
         utilization=worst if strength.known else None,
         governing=governing if strength.known else (),
-        warnings=tuple(said),
+        warnings=tuple(warnings),
         buckling=buckling,
         vibration=vibration,
         rounds=tuple(rounds),
@@ -218,12 +216,12 @@ def _figures_of(result: CaseResult, used: np.ndarray | None) -> CaseFigures:
 
 def _limits(truss: Truss, figures: Sequence[CaseFigures], checks: MemberChecks) -> list[str]:
     """Return warnings of slender members and great displacements."""
-    said = []
+    warnings = []
     radius = np.array([section.radius for section in truss.sections])[truss.section_of]
     slender = checks.effective_length * truss.lengths / radius
     if (over := slender > checks.slenderness).any():
         first = truss.member_marks[int(slender.argmax())]
-        said.append(
+        warnings.append(
             f"{over.sum():,} of {len(over):,} members are more slender than {checks.slenderness:g}, the most {first} with"
             f" {slender.max():.0f}"
         )
@@ -232,107 +230,8 @@ def _limits(truss: Truss, figures: Sequence[CaseFigures], checks: MemberChecks) 
     span = span_of(truss)
     if span > 0 and most.displacement_max > span / checks.deflection:
         ratio = span / most.displacement_max if most.displacement_max else math.inf
-        said.append(
+        warnings.append(
             f"the displacement of {words_of_number(1e3 * most.displacement_max, 3)} mm under {most.name} is span/{ratio:.0f}, more than"
             f" span/{checks.deflection:g} of the span {span:.3g} m"
         )
-    return said
-
-
-def chosen_cases(report: StructureReport, most: int = 12) -> list[CaseFigures]:
-    """Return each load case, then the combinations that use the members or move the nodes most."""
-    cases = [case for case in report.cases if case.state == "case"]
-    others = [case for case in report.cases if case.state != "case"]
-    others.sort(key=lambda case: (case.state != "ULS", -(case.utilization_max or 0.0), -case.displacement_max))
-    chosen = [case for case in others if case.state == "ULS"][: most // 2]
-    chosen += sorted((case for case in others if case.state == "SLS"), key=lambda case: -case.displacement_max)[
-        : max(most // 12, 1)
-    ]
-    return cases + chosen
-
-
-def structure_lines(report: StructureReport) -> list[tuple[str, ...]]:
-    """Return rows of a table of `chosen_cases`; see `STRUCTURE_HEAD`."""
-    return [
-        (
-            case.name,
-            *(_kilonewtons(force, case) for force in (case.applied[2], case.reactions[2])),
-            words_of_number(1e3 * case.displacement_max, 3),
-            words_of_number(case.force_min / 1e3, 4),
-            words_of_number(case.force_max / 1e3, 4),
-            use_words(case.utilization_max),
-        )
-        for case in chosen_cases(report)
-    ]
-
-
-def _kilonewtons(force: float, case: CaseFigures) -> str:
-    """Return a force of a case for a table; 0 where it is rounding beside the forces in the members."""
-    rounding = 1e-9 * max(abs(case.force_min), abs(case.force_max))
-    return words_of_number(force / 1e3, 4) if abs(force) > rounding else "0"
-
-
-def unlisted_lines(report: StructureReport) -> list[str]:
-    """Return a line on how many combinations `structure_lines` leaves out; nothing where it has all."""
-    more = len(report.cases) - len(structure_lines(report))
-    which = (
-        "combinations, which use the members or move the nodes"
-        if more > 1
-        else "combination, which uses the members or moves the nodes"
-    )
-    return [f"and {more:,} more {which} less"] * (more > 0)
-
-
-def half_lines(report: StructureReport) -> list[str]:
-    """Return a line on the worst half of snow, where there are several."""
-    part_loaded = [case for case in report.cases if case.state == "case" and case.name.startswith("half-snow ")]
-    if len(part_loaded) < 2:
-        return []
-    moved = max(part_loaded, key=lambda case: case.displacement_max)
-    used = max(part_loaded, key=lambda case: case.utilization_max or 0.0)
-    which = "and" if used is moved else f"and {used.name}"
-    most = f", {which} uses the members most, {use_words(used.utilization_max)}" if used.utilization_max else ""
-    return [
-        f"of {len(part_loaded)} cases with half the snow, {moved.name} moves the nodes most, {1e3 * moved.displacement_max:.3g} mm{most}"
-    ]
-
-
-def use_words(utilization: float | None) -> str:
-    """Return a utilization in words: of absurd loads only that it is beyond all measure."""
-    if utilization is None:
-        return "-"
-    return f"{utilization:.2f}" if utilization <= MOST_UTILIZATION else f"> {MOST_UTILIZATION:g}"
-
-
-def mode_lines(report: StructureReport) -> list[str]:
-    """Return lines on buckling and vibration, where they were asked for."""
-    said = []
-    if report.buckling is not None:
-        factors = ", ".join(f"{value:.4g}" for value in report.buckling.values)
-        said.append(
-            f"buckling factors of {report.buckling.of}: {factors}" if factors else "no load makes the structure buckle"
-        )
-    if report.vibration is not None:
-        values = ", ".join(f"{value:.4g}" for value in report.vibration.values)
-        said.append(
-            f"natural frequencies: {values} Hz" if values else "no node can move, so there are no natural frequencies"
-        )
-    if report.path is not None:
-        said.append(path_words(report.path))
-    return said
-
-
-def sizing_lines(report: StructureReport) -> list[str]:
-    """Return a line where the sections are larger than the members need, so that the structure does not buckle too early."""
-    passed = [each for each in report.rounds if each.buckling is not None]
-    if len(passed) < 2:
-        return []
-    return [
-        f"all members pass at {passed[0].mass:,.0f} kg, but there the structure buckles at {passed[0].buckling:.3g} times its loads;"
-        f" larger sections raise that to {passed[-1].buckling:.3g}"
-    ]
-
-
-STRUCTURE_HEAD = (
-    "load case", "applied z [kN]", "reaction z [kN]", "moves [mm]", "force min [kN]", "force max [kN]", "utilization",
-)  # fmt: skip
+    return warnings

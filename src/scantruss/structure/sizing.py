@@ -12,7 +12,8 @@ from .catalogue import Section, bundled_sections
 from .checks import MemberChecks, section_class, strengths, utilizations
 from .groups import WAYS_TO_GROUP, member_groups_of
 from .modes import worst_buckling
-from .statics import CaseResult, Solution, factor_stiffness, solve
+from .results import CaseResult
+from .statics import factor_stiffness, solve
 from .truss import Truss
 
 ROUNDS = 60  #: of solving and choosing
@@ -83,14 +84,14 @@ def size_members(
     All members begin with the lightest section. Each round solves the structure and gives every member the lightest section
     that resists its forces, never a lighter one than before; then the sections are made few, at the least mass, by heavier
     ones. Once all pass, the lightest sections grow until the structure buckles at no less than the factor of the checks (EN 1993-1-1
-    5.2.1(3)). Fewer sections are taken where they are lighter, as they may be where buckling decides.
+    5.2.1(3)). Fewer sections are used if they are lighter, as they may be if buckling decides.
 
     Parameters
     ----------
     truss : Truss
-        Its first section tells the kind.
+        Its first section gives the kind.
     count : int
-        Different sections at most.
+        Most different sections.
     checks : MemberChecks, optional
         Buckling length, partial factors.
     rounds : list of SizingRound, optional
@@ -134,7 +135,7 @@ def _sized(truss: Truss, count: int, checks: MemberChecks, rounds: list[SizingRo
         truss = truss.replace(sections=tuple(chain), section_of=chosen)
         factored = factor_stiffness(truss)
         solution = solve(truss, factored)
-        judged = _judged(solution)
+        judged = solution.judged_results()
         needed = _same_in_groups(_needed(truss, judged, chosen, checks), group_of)
         least = None
         if (needed <= chosen).all():
@@ -181,11 +182,6 @@ def weight_curve(
             mass = _sized(truss, number, checks or MemberChecks(), [], by).mass
             curve[number] = min([mass, *curve.values()])
     return curve | {count: sized.mass}
-
-
-def _judged(solution: Solution) -> list[CaseResult]:
-    """Return the results of the ULS combinations, or of all load cases where there are none."""
-    return [result for result in solution.all_results() if result.state == "ULS"] or list(solution.cases)
 
 
 def _needed(truss: Truss, judged: list[CaseResult], chosen: np.ndarray, checks: MemberChecks) -> np.ndarray:

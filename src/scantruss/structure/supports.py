@@ -1,4 +1,4 @@
-"""Supports: which nodes are held, and how."""
+"""Supports: which nodes are supported, and how."""
 
 from __future__ import annotations
 
@@ -19,9 +19,8 @@ if TYPE_CHECKING:
     from .truss import Truss
 
 SUPPORT_TURN = 45.0  #: least turn of the boundary, seen over two members to either side, at a corner [degree]
-SHARP_TURN = (
-    40.0  #: least turn at one node, seen over one member and over two, that makes it a corner beside others [degree]
-)
+#: least turn at one node, seen over one member and over two, that makes it a corner beside others [degree]
+SHARP_TURN = 40.0
 SUPPORT_WAYS = "corners, boundary, lowest:H, fixed, ends, line:NAME, loop:N"
 OTHER_WAYS = f"name others with --supports: {SUPPORT_WAYS}, a node such as N001 or a file of positions"
 SUPPORT_WORDS = ("corners", "boundary", "fixed", "ends")  #: of these, those without a value
@@ -126,7 +125,7 @@ def _nodes_of(truss: Truss, word: str) -> np.ndarray:
         marks = truss.node_marks
         raise InputError(f"no supports {word!r}: the nodes are marked {marks[0]} to {marks[-1]}")
     if re.search(r"[/\\]|\.[A-Za-z]{1,5}$", word):
-        raise InputError(f"no supports: there is no file {word}; it needs positions X,Y,Z, one a line")
+        raise InputError(f"no supports: there is no file {word}; it needs positions X,Y,Z, one per line")
     raise InputError(
         f"no supports {word!r}{did_you_mean(word, (*SUPPORT_WORDS, *truss.node_sets))}; name some with --supports:"
         f" {SUPPORT_WAYS}, a node such as N001 or a file of positions"

@@ -25,7 +25,7 @@ USUAL_MEMBER = (0.1, 30.0)  #: members outside of this length are said to be odd
 
 @dataclass(frozen=True, eq=False)
 class LoadCase:
-    """Loads that act together; what is None is not there."""
+    """Loads that act together; None for those that are absent."""
 
     name: str
     action: str = "variable"  #: permanent, snow, wind, temperature or variable: its factors in the combinations
@@ -141,7 +141,7 @@ class Truss:
         layer_edges: str = "",
         sharp_bends: str = BEND_WAYS[0],
     ) -> Truss:
-        """Return the structure of a grid; the grid's unit is turned into metres here and nowhere else.
+        """Return the structure of a grid; the grid's unit is converted to metres here and nowhere else.
 
         Parameters
         ----------
@@ -211,13 +211,13 @@ class Truss:
     def warnings(self) -> list[str]:
         """What is odd about the size, in words."""
         low, high = USUAL_MEMBER
-        said = []
+        warnings = []
         if (middle := float(np.median(self.lengths))) < low or middle > high:
-            said.append(
+            warnings.append(
                 f"members of {_readable(middle)} (median) at scale {self.scale:g}: usual are {low:g} to {high:g} m;"
                 " check --scale and the unit of the grid"
             )
-        return said
+        return warnings
 
 
 def local_axes(x: np.ndarray, normals: np.ndarray) -> np.ndarray:

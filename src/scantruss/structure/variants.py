@@ -59,7 +59,7 @@ class VariantFigures:
 
 
 def solve_variants(grid: Grid, variants: Variants) -> tuple[VariantFigures, ...]:
-    """Return what comes out of every pair of supports and rise, supports first."""
+    """Return the result of every pair of supports and rise, supports first."""
     return tuple(
         _solved(grid, variants.settings, where, rise) for where in variants.supports for rise in variants.rises
     )

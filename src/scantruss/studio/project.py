@@ -21,7 +21,7 @@ from ..runtime.ours import MARK
 from ..scan.cloud import PointCloud
 from ..settings import Settings
 from ..structure.options import StructureSettings, read_structure_settings, settings_text
-from ..structure.statics import Solution
+from ..structure.results import Solution
 from .project_trade import TRADE_BEFORE, TRADE_HEAD, TRADE_NODES, head_of_trade, nodes_of_trade, trade_of_parts
 from .scan_parts import Cleaning, WholeScan, part_of_scan, taken_of_scan
 from .state import Design, StudioState, Trade

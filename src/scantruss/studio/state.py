@@ -12,7 +12,7 @@ from ..scan.cloud import PointCloud
 from ..settings import Settings
 from ..structure.options import StructureSettings
 from ..structure.report import StructureReport
-from ..structure.statics import Solution
+from ..structure.results import Solution
 from .scan_parts import Cleaning, WholeScan, taken_of_scan
 
 MOST_UNDONE = 200  #: that can be taken back

@@ -12,7 +12,7 @@ from typing import Any
 from ..grid.grid import Grid
 from ..scan.cloud import PointCloud
 from ..settings import Settings
-from ..structure.statics import Solution
+from ..structure.results import Solution
 from .project import save_project
 from .state import History, StudioState
 from .worker import StoppedError, Worker, words_of

@@ -23,25 +23,22 @@ Voxels = NDArray[np.bool_]
 DistanceField = NDArray[np.float64]  # a value for each voxel
 
 VOXEL_SIZE = 1.0 / 6.0  # size of a voxel [member lengths]
-COARSEST_VOXEL = 0.25  # the same of a large scan [member lengths]
-MOST_VOXELS = 8_000_000
+COARSEST_VOXEL = 0.25  # size of a voxel of a large scan [member lengths]
+MOST_VOXELS = 8_000_000  # voxels above which they are made larger
 PLANES_PER_THREAD = 16  # planes of voxels that a thread looks at, at least
 SURELY_BEYOND = 8  # distance as far as the depth in a body has to be known, where it is smoothed and compared [voxels]
-LIMB_RADIUS = (
-    0.45  # of the ball that does not fit into a limb: three members round are a limb of radius 0.48 [member lengths]
-)
+# of the ball that does not fit into a limb: three members round are a limb of radius 0.48 [member lengths]
+LIMB_RADIUS = 0.45
 SLIT_RADIUS = 0.3  # of the ball that does not fit into a slit [member lengths]
-DEPTH_OF_LIMBS = (
-    0.2  # how far a limb stands out, or a slit goes in, beyond what every edge and corner loses [member lengths]
-)
-OFF_BODY = (
-    1.3  # distance from the surface of the body from which on a point belongs to what was taken off or filled [voxels]
-)
+# how far a limb stands out, or a slit goes in, beyond what every edge and corner loses [member lengths]
+DEPTH_OF_LIMBS = 0.2
+# distance from the surface of the body from which on a point belongs to what was taken off or filled [voxels]
+OFF_BODY = 1.3
 WALL_SAMPLES = 0.12  # distance of the samples that wall off the inside [member lengths]
-NEIGHBORS_AT_BOUNDARY = 12  # samples around one that tell whether it lies at a boundary
+NEIGHBORS_AT_BOUNDARY = 12  # samples around one that show whether it lies at a boundary
 WIDEST_LINK = 0.8  # largest distance of linked samples between which there is a wall [member lengths]
-SPARSE_LINK = 2.0  # the same where points are sparse, in distances of the sixth neighbour
-DISC_RADIUS, DISC_CORNERS = 1.25, 12  # of a disc, in distances of the sixth neighbour
+SPARSE_LINK = 2.0  # largest distance of such samples where points are sparse, in distances of the sixth neighbour
+DISC_RADIUS, DISC_CORNERS = 1.25, 12  # radius of a disc, in distances of the sixth neighbour, and its corners
 WALL_STEP = 0.9  # distance of places on a wall [voxels]
 OPEN_GAP = 170.0  # angle between linked samples from which on there is no wall between them [degree]
 BOUNDARY_GAP = 130.0  # angle around a sample without others from which on it lies at a boundary [degree]

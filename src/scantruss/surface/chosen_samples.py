@@ -30,15 +30,8 @@ from .size_field import Wish, wish_of
 
 SPARSE_SPACING = 0.08  # point spacing above which larger samples are not tried [member lengths]
 UNEVEN_BEND = 20.0  # largest angle between mirrored normals on a smooth scan; at a ridge it is twice as large [degree]
-KEPT, DUPLICATE, OUTLIER, SPARSE_POINT, ROD, LIMB, SLIT = (
-    0,
-    1,
-    2,
-    3,
-    4,
-    5,
-    6,
-)  # what a point of the scan was judged to be
+# what a point of the scan was judged to be
+KEPT, DUPLICATE, OUTLIER, SPARSE_POINT, ROD, LIMB, SLIT = 0, 1, 2, 3, 4, 5, 6
 # thickness above which a sample shows that the scan is rough at the scale of a member [member lengths]
 ROUGH_THICKNESS = 0.08
 

@@ -1,4 +1,4 @@
-"""Normals that a scan comes with: they tell the two sides of something thin apart where the points alone do not."""
+"""Normals that a scan comes with: they distinguish the two sides of something thin where the points alone do not."""
 
 from __future__ import annotations
 

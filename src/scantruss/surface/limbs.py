@@ -19,9 +19,8 @@ from .linked_samples import link_samples
 from .pieces import LEAST_TRIANGLES, TRIANGLE_AREA, sample_areas
 from .scratch import with_own_scratch
 
-SUSPECT_WITHIN = (
-    1.1  # distance from a sample within which one faces the opposite way on a limb too thin [desired lengths]
-)
+# distance from a sample within which one faces the opposite way on a limb too thin [desired lengths]
+SUSPECT_WITHIN = 1.1
 FINE_SAMPLES = 0.1  # radius of the samples by which girths are measured [member lengths]
 HALF_SECTION = 0.15  # half the thickness of a section [desired lengths]
 LARGEST_GIRTH = 1.2  # largest girth that is measured [girth below which limbs are cut off]
@@ -32,15 +31,14 @@ SURE_GIRTH = 0.95  # girth at the thinnest twentieth of a limb above which it is
 CLEAN_RING_SHARE = 0.8  # least share of the samples on each side of a ring that are on the right side
 NECK_GIRTH = 0.8  # girth down to which a neck before such an end stays [girth below which limbs are cut off]
 LOOKED_AROUND_RING = 0.4  # how far a ring is looked around for, beside its own radius [desired lengths]
-NEAR_PLANE = 0.3  # distance from the plane of a ring up to which points tell its shape [desired lengths]
+NEAR_PLANE = 0.3  # distance from the plane of a ring up to which points show its shape [desired lengths]
 RING_WAVES = 3  # of a ring: its radius is a Fourier series of so many terms
 WIDEST_GAP = 100.0  # largest angle without points, seen from the middle of a ring [degree]
-SMALLEST_RING = (
-    2.5  # girth of a ring below which it is no boundary but a hole that the front runs over [desired lengths]
-)
-POINTS_OF_RING = 72
+# girth of a ring below which it is no boundary but a hole that the front runs over [desired lengths]
+SMALLEST_RING = 2.5
+POINTS_OF_RING = 72  # points of the polygon that stands for a ring
 MOST_OF_SCAN_THIN = 0.4  # share of the scan above which what is thin is the scan itself
-LIMBS_PER_THREAD = 400
+LIMBS_PER_THREAD = 400  # fewest places worth a thread of their own
 
 
 @dataclass(frozen=True, eq=False)

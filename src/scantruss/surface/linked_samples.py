@@ -17,9 +17,10 @@ from .streamline import is_dense, streamlined
 
 LINKS_OF_A_SAMPLE = 12  # most links of a sample
 LINK_BOX = 4.0  # size d_B of the search boxes of the samples (Eq. 1), in which they are linked [sample radii]
-BOX_SIZE = 2.2  # size of the search boxes while samples are chosen [sample radii]
+CHOOSING_BOX = 2.2  # size of the search boxes while samples are chosen [sample radii]
 POINTS_TO_SORT = 250_000  # points from which on they are sorted in space, because they do not fit into the cache
-SAMPLES_TO_SORT = 40_000  # the same number where most points are samples themselves, which takes more memory
+# points from which on they are sorted where most are samples themselves, which takes more memory
+SAMPLES_TO_SORT = 40_000
 LONE_SPACING = 0.3  # point spacing above which most points are samples themselves [sample radii]
 SORTING_RADIUS = 8.0  # radius of the samples by which points are sorted [sample radii]
 LINKED_POINTS_PER_THREAD = 20_000  # fewest points worth a thread of their own
@@ -92,7 +93,7 @@ def link_finer(
 ) -> tuple[Linked, float] | None:
     """Return finer samples and their radius if they form smooth sheets, else None.
 
-    Sheets that lie only a few samples apart look like one rough layer; finer samples tell them apart.
+    Sheets that lie only a few samples apart look like one rough layer; finer samples separate them.
     """
     for _ in range(MOST_REFINEMENTS):
         radius *= 0.5
@@ -155,7 +156,7 @@ def samples_of_points(
     capacity, begin, count = 1 << 14, 0, 0
     chosen, places = np.empty(capacity, np.int64), np.empty((capacity, 3))
     while True:
-        boxes = new_boxes(lower, upper, BOX_SIZE * radius, capacity, capacity)
+        boxes = new_boxes(lower, upper, CHOOSING_BOX * radius, capacity, capacity)
         kernels.put_all(boxes, points, chosen[:count])
         begin, count = kernels.choose_samples(points, radius, boxes, owner, chosen, places, begin, count, facing)
         if begin == len(points):

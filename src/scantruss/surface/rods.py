@@ -9,14 +9,14 @@ from ..kernels.surface.rods import spreads_around
 from .linked_samples import Linked
 
 COARSE_REACH = 1.0  # radius of the neighbourhood that shows whether a sample is of a rod [member lengths]
-FINE_REACH = 0.6  # the same once rods are found, for the joints of scaffold [member lengths]
+FINE_REACH = 0.6  # radius of that neighbourhood once rods are found, for the joints of scaffold [member lengths]
 SAMPLES_OF_SHEET = 6  # fewest samples in a neighbourhood, rods excluded, that make a sheet
 THIN_VARIANCE = 0.15  # largest variance across a rod, in that along it; half a disc, as at a boundary, has 0.28
 END_REACH = 1.3  # distance from a rod up to which samples may be its ends [member lengths]
 END_OFFSET = 0.1  # distance from the sheet above which a sample near a rod is an end of it [member lengths]
 MOST_RODS = 0.4  # share of the samples above which they are not rods but the scan itself
 END_ROUNDS = 3  # most rounds in which ends of rods are looked for
-FEWEST_SAMPLES_AROUND = 24  # samples in a usual neighbourhood from which a rod can be told from a sheet
+FEWEST_SAMPLES_AROUND = 24  # samples in a usual neighbourhood that distinguish a rod from a sheet
 ROD_DISTANCE = 0.8  # distance from all sheets at which a rod stands at one place at least [member lengths]
 
 

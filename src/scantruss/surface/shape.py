@@ -19,16 +19,19 @@ SAMPLES_LOOKED_AT = 5_000  # most samples from which the variance around a place
 LINE_VARIANCE = 0.02  # largest second variance of points along a line [first variance]
 SHARE_OF_A_LINE = 0.01  # share of the samples that a line has at least
 VOLUME_VARIANCE = 0.45  # least smallest variance of points that fill a volume, within a member [largest variance]
-NEAR_VOLUME_VARIANCE = 0.25  # the same within half a member
-DECISIVE_SHARE = 0.6  # share of the places above which a scan counts as lines or as a volume
-VOLUME_PLACES = 0.35  # the same for a volume: places near its surface see only half of it
+# least smallest variance of points that fill a volume, within half a member [largest variance]
+NEAR_VOLUME_VARIANCE = 0.25
+DECISIVE_SHARE = 0.6  # share of the places above which a scan counts as lines
+# share of the places above which a scan counts as a volume: places near its surface see only half of it
+VOLUME_PLACES = 0.35
 FEWEST_SAMPLES_AROUND_PLACE = 30  # samples within a member below which all that lie there are looked at
 NEAREST_COUNTED = 16  # points around a place that always count
 LAYER_REACH = 0.7  # radius within which two layers are looked for [member lengths]
-CLOSE_LAYERS = 0.5  # distance below which a grid cannot tell two layers apart [member lengths]
+CLOSE_LAYERS = 0.5  # distance below which a grid sees two layers as one [member lengths]
 EACH_LAYER = 0.2  # least share of the points in each of two layers
 LAYER_DISTANCE = 4.0  # least distance between two layers [rms thickness of the thicker one]
-SOME_LAYERS = 0.1  # the same where the layers have become one by smoothing
+# share of the places with two layers from which on they are reported where they have become one by smoothing
+SOME_LAYERS = 0.1
 MANY_LAYERS = 0.3  # share of the places with two layers from which on they are reported
 
 
@@ -118,7 +121,7 @@ def layers_of_surface(samples: SurfaceSamples) -> tuple[float, float]:
 
 
 def _layer_distance(points: np.ndarray) -> float:
-    """Return the distance between two layers of points (N, 3), 0 if they cannot be told apart."""
+    """Return the distance between two layers of points (N, 3), 0 if they look like one."""
     centred = points - points.mean(axis=0)
     _, _, axes = np.linalg.svd(centred, full_matrices=False)
     height = np.sort(centred @ axes[2])

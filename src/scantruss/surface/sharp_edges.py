@@ -21,18 +21,14 @@ if TYPE_CHECKING:
     from .linked_samples import Linked
 
 THICK_AT_EDGE = 0.03  # thickness above which a sample may lie on a sharp edge [member lengths]
-EDGE_REACH = 0.7  # distance within which other samples tell whether it does [member lengths]
+EDGE_REACH = 0.7  # distance within which other samples decide whether it does [member lengths]
 FEWEST_EDGE_SAMPLES = 8  # fewest samples of an edge
-BESIDE_EDGE = (
-    1.2  # distance from an edge within which samples stay in their places, and are finer where thick [member lengths]
-)
-UNSURE_EDGE = (
-    0.6  # distance from an edge within which other thick samples tell little of which way a side faces [member lengths]
-)
-EDGE_SHARE, FEWEST_NEEDED = (
-    0.02,
-    40,
-)  # share of the samples that lie on sharp edges where these are worth an attempt, and their number
+# distance from an edge within which samples stay in their places, and are finer where thick [member lengths]
+BESIDE_EDGE = 1.2
+# distance from an edge within which other thick samples hardly show which way a side faces [member lengths]
+UNSURE_EDGE = 0.6
+# share of the samples that lie on sharp edges where these are worth an attempt, and their number
+EDGE_SHARE, FEWEST_NEEDED = 0.02, 40
 
 
 def on_sharp_edges(found: Linked, normals: np.ndarray, length: float) -> np.ndarray:

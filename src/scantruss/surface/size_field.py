@@ -22,9 +22,8 @@ STEEPEST_GROWTH = (
 FLAT_BULGE = 0.002  # bulge of the longest member below which it counts as flat [its length]
 LESS_CURVED_SHARE = 0.95  # share of the scan that is less curved than the places with the shortest members
 NOISE_DEVIATIONS = 4.6  # standard deviations of a curvature up to which it may be noise
-WIDEST_CURVATURE_PATCH = (
-    4.0  # patches in which a curvature may be measured; noise falls with their width [usual patches]
-)
+# patches in which a curvature may be measured; noise falls with their width [usual patches]
+WIDEST_CURVATURE_PATCH = 4.0
 FARTHEST_FROM_SCAN = 1.0  # largest distance of a given length from the scan [that length]
 LENGTHS_PER_THREAD = 200  # fewest samples worth a thread of their own
 

@@ -11,7 +11,7 @@ from .style import angles_of
 
 EYE_DISTANCE = 3.4  #: of the eye from the middle, in radii of the grid; a mild perspective
 OPEN_SHELL = 0.5  # length of the mean normal by area above which a shell is open: it faces one way on the whole
-LEAST_FACING = 0.08  # ... above which it tells which way is up if no flat face does
+LEAST_FACING = 0.08  # length of the mean normal by area above which it decides which way is up if no flat face does
 FACE_DEPTH = 0.02  # how flat the face is on which something stands [longest side]
 FLAT_FACE = 0.1  # least share of such a face in the plan
 UPRIGHT = 3.0  # how much more a face counts that is below in a file with y or z up

@@ -15,8 +15,9 @@ import numpy as np
 
 from ...errors import words_of_number
 from ...grid.grid import Grid
-from ...runtime.files import check_place, write_files
+from ...runtime.files import write_files
 from ...runtime.ours import MARK
+from ...runtime.places import check_place
 from ...scan.cloud import SURVEY_UNITS, PointCloud
 from .camera import Camera, choose_camera
 from .left_out import Shown, shown_points
@@ -44,7 +45,7 @@ if TYPE_CHECKING:
 
 PICTURE_SIZE = (1600, 1200)  #: of a picture [pixel]
 PANELS_SIZE = (2400, 800)  #: of three panels, or of several views [pixel]
-UP = np.array([0.0, 0.0, 1.0])
+UP = np.array([0.0, 0.0, 1.0])  # against gravity
 
 
 def encode_picture(
@@ -109,7 +110,7 @@ def plot_grid(grid: Grid, cloud: PointCloud | None, views: tuple[str, ...], size
 
 
 def known_upward(grid: Grid, cloud: PointCloud | None) -> np.ndarray | None:
-    """Return the direction against gravity (3,) if unit or file tell it: scans of buildings and terrain have z up."""
+    """Return the direction against gravity (3,) if unit or file give it: scans of buildings and terrain have z up."""
     known = grid.unit in SURVEY_UNITS or (cloud is not None and cloud.z_is_up)
     return UP if known else None
 

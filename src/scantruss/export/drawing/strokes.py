@@ -12,8 +12,8 @@ from ...scan.cloud import PointCloud
 from .camera import Camera, map_depth
 
 MOST_POINTS = {True: 40_000, False: 120_000}  #: of the scan that are drawn, over a grid and alone
-PAPER = np.array([0.984, 0.980, 0.969])
-GROUND = np.array([0.925, 0.918, 0.898])
+PAPER = np.array([0.984, 0.980, 0.969])  # background
+GROUND = np.array([0.925, 0.918, 0.898])  # shadow on the ground
 INK = np.array([0.098, 0.180, 0.290])  # members
 BOUNDARY_COLOR = np.array([0.047, 0.098, 0.176])  # members on a boundary
 OUTSIDE_SHADES = (

@@ -14,7 +14,7 @@ from .plates import PrintedPart
 WALL = 0.2  # least wall between two sockets over the diameter of the rod
 LEAST_DEPTH = 0.5  # of a socket over the diameter of the rod
 DEEPEST = 0.7  # of a socket over the radius of the ball
-SOCKET_SIDES = 32
+SOCKET_SIDES = 32  # sides of the prism that stands for a socket
 
 
 def build_nodes(

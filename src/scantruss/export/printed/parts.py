@@ -21,7 +21,7 @@ from ...layouts.framework import outer_normals
 from ..solid import balls_of, bars_of, check_diameters, marked_bars, unite
 from .plates import Bed, PrintedPart
 
-PEG_SIDES = 32
+PEG_SIDES = 32  # sides of the prism that stands for a peg
 PEG = 0.5  # radius of a peg over that of the coupling; it is as long as the coupling's radius
 FLOOR = 0.4  # what a coupling is longer than its socket, over its radius
 THINNEST = 1.4  # coupling over member

@@ -12,7 +12,8 @@ from ...errors import InputError
 from ...grid.certificate import check_passed
 from ...grid.grid import Grid
 from ...grid.marks import member_marks, node_marks, numbered
-from ...runtime.files import check_place, write_files
+from ...runtime.files import write_files
+from ...runtime.places import check_place
 from ..csv import encode_table
 from ..engraving import letter_height
 from ..solid import SUFFIXES, as_solid
@@ -63,17 +64,17 @@ def print_parts(
     scale : float
         Size of the model over the size of the grid.
     bed : (width, depth, height), optional
-        Of the printer; parts lie on it in shelves, a file for each plate [unit of the grid].
+        Size of the printer's bed; parts lie on it in rows, a file for each plate [unit of the grid].
     sockets : bool
         A ball for each node, with sockets for rods, in place of a model cut into parts.
     clearance : float, optional
-        Between peg or rod and socket, all around; 0.15 members [unit of the grid].
+        Gap between a peg or rod and its socket, all around; by default 0.15 members [unit of the grid].
     sides : int
         Sides of a member.
     marks : bool
         Engrave the mark of each node on its ball.
     keep_failed : bool
-        Print a grid that failed its certificate too.
+        Print a grid even if it failed its certificate.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Choosing the triangle of a segment and driving the front (Sec. 3.4, 3.5, Fig. 4)."""
+"""Choosing the triangle of a segment, and the loop over active segments (Sec. 3.4, 3.5)."""
 
 from __future__ import annotations
 
@@ -44,9 +44,8 @@ from .front import (
 )
 
 ALONG_LIMB = 0.3  # cosine between a triangle and the normal at a node below which it may shut off a limb
-TRIANGLE_OFF_SHEET = (
-    0.36  # distance of the middle of a triangle from the nearest sample at which it has left the sheet [member lengths]
-)
+# distance of the middle of a triangle from the nearest sample at which it has left the sheet [member lengths]
+TRIANGLE_OFF_SHEET = 0.36
 SIGHT, TIP = 0.9, 0.55  # how far such a triangle looks for more scan, and what may lie beyond it [member lengths]
 STEPS_AROUND = 4  # in which the surface is followed around a bend
 NO_BEND = 0.8  # cosine between the normals before and behind a bend above which it is none
@@ -63,11 +62,9 @@ WIDEST_CLOSED, WIDER_CLOSED = 2.2, 0.7  # widest angle that a triangle with a ne
 AROUND_IDEAL, FARTHER_AROUND_IDEAL = 0.75, 0.9  # distance of a node from the ideal point [member lengths]
 # least distance of a new node from the front, as a share of the setting: at strictness 0, what strictness 1 adds, and for both
 LOOSE_ROOM, STRICT_ROOM, ROOM_OF_NEW_NODE = 0.4, 0.6, 1.1
-ROOM_OF_CANDIDATE = 0.5  # the same for a candidate node
-WORTH_OF_FRONT_NODE, WORTH_OF_CANDIDATE = (
-    0.9,
-    0.95,
-)  # of the quality with a node of the front that is no neighbour, a candidate
+ROOM_OF_CANDIDATE = 0.5  # least distance of a candidate node from the front, as a share of the setting
+# of the quality with a node of the front that is no neighbour, a candidate
+WORTH_OF_FRONT_NODE, WORTH_OF_CANDIDATE = 0.9, 0.95
 LEAST_QUALITY = 0.5  # quality at strictness 1 below which a triangle waits for a later round
 STEEP_SIDE = 0.6  # cosine of the angle between that side and the plane of its nodes below which the side is followed
 
@@ -310,7 +307,7 @@ def advance(surface: Surface, front: Front, rules: Rules, budget: int) -> int:
 
 @kernel
 def advance_by_cases(surface: Surface, front: Front, rules: Rules, budget: int) -> int:
-    """The same by the six cases of Table 1; separate from `advance`, so that it is compiled for method paper only."""
+    """Advance segments by the six cases of Table 1, as `advance` does by quality; apart, so that it is compiled for method paper only."""
     found = np.empty(MOST_NEAR_NODES, np.int64)
     patch = np.zeros(PATCH_COLUMNS)
     for _ in range(budget):

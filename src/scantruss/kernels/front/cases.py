@@ -38,9 +38,8 @@ LEAST_DELTA = 0.3  # quality delta below which no triangle with an existing node
 SEARCH_REACH = 2.4  # distance from a segment up to which nodes of the front are considered [lengths]
 # least distance of a new node from a candidate node that the front has not reached yet [lengths]
 CANDIDATE_CLEARANCE = 0.45
-STEPS_AROUND_MERGED = (
-    2.0  # how far from their middle the point is looked for that two nodes become [steps between samples]
-)
+# how far from their middle the point is looked for that two nodes become [steps between samples]
+STEPS_AROUND_MERGED = 2.0
 MARGIN_OF_SEARCH = 1.5  # how much farther than the search range the samples reach whose points are looked at
 WIDENED_SEARCH = 2.0  # by which a search range without points grows, once
 

@@ -33,13 +33,14 @@ TOLERATED_DISORDER = (2, 0, 2)  # growth of the disorder by a flip, collapse or 
 REPAIRABLE_DISORDER = 6  # growth beyond that up to which flips around are tried first
 MOST_REPAIRS = 4  # most of these flips
 SETTLING_SWEEPS = 2  # sweeps in which all nodes around a move settle
-EARLY_ALLOWANCE = (0.35, 1.2, 2.0)  # growth of the energy up to which a trial goes on once the quadrangle has settled
-LATE_ALLOWANCE = (0.06, 0.3, 0.5)  # the same once all nodes around have settled; for a flip, collapse, split
+# growth of the energy by a flip, collapse or split up to which a trial goes on once the quadrangle has settled
+EARLY_ALLOWANCE = (0.35, 1.2, 2.0)
+# growth of the energy by a flip, collapse or split up to which it goes on once all nodes around have settled
+LATE_ALLOWANCE = (0.06, 0.3, 0.5)
 STRAINED = 0.15  # relative deviation of a member from its desired length above which its nodes ask for moves
 SHORTEST_SPLIT = 1.05  # length of the shortest member that is split [desired length]
-LONGEST_LINE_MEMBER = (
-    1.5  # length from which on a line between two nodes at rest keeps a node between them [desired length]
-)
+# length from which on a line between two nodes at rest keeps a node between them [desired length]
+LONGEST_LINE_MEMBER = 1.5
 LONGEST_COLLAPSED = 1.1  # length of the longest member that is collapsed [desired length]
 SHORTEST_TRIAL_STEP = 0.005  # shortest step that is made in a trial [member lengths]
 

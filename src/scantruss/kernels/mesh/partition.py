@@ -1,6 +1,6 @@
-"""Two halves of a grid on which two threads work at once, and the nodes between them, which do not change meanwhile.
+"""Two parts of a grid on which two threads work at once, and the nodes between them, which do not change meanwhile.
 
-A move depends on nodes at most two members away. Two rings of nodes between the halves do not change, so that neither half depends on
+A move depends on nodes at most two members away. Two rings of nodes between the parts do not change, so that neither part depends on
 the other and the result does not depend on the timing of the threads.
 """
 
@@ -11,7 +11,7 @@ import numpy as np
 from ...runtime.jit import kernel
 from .grid import Net
 
-BETWEEN_HALVES = -1  # label of the nodes between the halves
+BETWEEN_PARTS = -1  # label of the nodes between the parts
 
 
 @kernel
@@ -50,9 +50,9 @@ def paths_from_ends(net: Net, among: np.ndarray, away: np.ndarray, queue: np.nda
 
 @kernel
 def part(net: Net, nearer: np.ndarray, label: np.ndarray) -> None:
-    """Label the nodes 0 or 1 by the end they are nearer to (C,) int64, or BETWEEN_HALVES if a neighbour is nearer to the other."""
+    """Label the nodes 0 or 1 by the end they are nearer to (C,) int64, or BETWEEN_PARTS if a neighbour is nearer to the other."""
     for v in range(net.in_use[0]):
         label[v] = nearer[v]
         for i in range(net.degree[v]):
             if nearer[net.ring[v, i]] != nearer[v]:
-                label[v] = BETWEEN_HALVES
+                label[v] = BETWEEN_PARTS

@@ -34,8 +34,8 @@ SAVED_FREE_NODES = 32  # free nodes from the top of the stack that are saved wit
 MOST_RANDOM_MOVES = 3  # most random moves of a perturbation
 SEARCH_ROUNDS = 2  # most rounds of settling and searching
 AREA_SWEEPS = 2  # sweeps in which the area settles in a round
-ALLOWANCE_SETTLED = 2.2  # energy that random moves may cost once the area has settled; more never pays in the end
-ALLOWANCE_SEARCHED = 0.2  # the same once it has been searched; what costs more hardly ever pays
+ALLOWANCE_SETTLED = 2.2  # energy that random moves may cost once the area has settled; what costs more never pays
+ALLOWANCE_SEARCHED = 0.2  # energy that they may cost once the area has been searched; what costs more hardly ever pays
 LISTED, UNFIT, OUT_OF_BOUNDS = 0, 1, 2  # what became of listing an area
 
 

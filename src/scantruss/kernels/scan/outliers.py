@@ -14,7 +14,7 @@ from ..geometry.vectors import Vector, across, cross, dot, norm, row, subtract
 from ..surface.patches import POINTS_FOR_PLANE, POINTS_FOR_QUADRIC, empty_patches, fit, height_variance, terms_for
 
 OUTLIER_PATCH_FITS = 3  # fits of a patch, each with less weight for points off the one before
-POINTS_OF_CLOUD = 40  # points around a place by which a cloud is told from a crease
+POINTS_OF_CLOUD = 40  # points around a place that distinguish a cloud from a crease
 FEW_COMPANY, COMPANY = 10, 16  # points by which a sheet through a point is found: a thin one, any
 # thickness of that sheet and distance of the point from it; 1 of 5,000 random points are as flat [radii]
 THIN_SHEET, OFF_SHEET = 0.08, 0.15

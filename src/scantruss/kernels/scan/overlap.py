@@ -10,6 +10,12 @@ from ...runtime.jit import kernel
 from ..geometry.boxes import SearchBoxes, nearest, search
 from ..geometry.vectors import Vector, cross, dot, row, subtract
 
+MOTION = 6  # numbers of a motion: three of rotation, three of translation; in the sums of a step the residual follows
+SLOPE_OF_PAIR = 0.6  # cosine of the angle between the normals of two places above which they make a pair
+SAME_SLOPE = 0.75  # cosine of the angle between two surfaces above which they agree
+OTHER_SIDE = -0.2  # cosine of that angle below which a point lies on the other side of a thin body
+OVER_PLACE = 1.5  # distance from a place along its surface within which a point lies over it [spacings]
+
 
 @kernel
 def first_places(points: np.ndarray, boxes: SearchBoxes, places: np.ndarray, reach: float, owner: np.ndarray) -> None:
@@ -106,10 +112,10 @@ def _add(sums: np.ndarray, arm: Vector, d: Vector, n: Vector, m: Vector, sharp: 
         t = cross(arm, a)
         rest = dot(a, d)
         w = weight * stiffness
-        for i in range(7):
-            u = rest if i == 6 else (t[i] if i < 3 else a[i - 3])
-            for j in range(7):
-                v = rest if j == 6 else (t[j] if j < 3 else a[j - 3])
+        for i in range(MOTION + 1):
+            u = rest if i == MOTION else (t[i] if i < 3 else a[i - 3])
+            for j in range(MOTION + 1):
+                v = rest if j == MOTION else (t[j] if j < 3 else a[j - 3])
                 sums[i, j] += w * u * v
 
 
@@ -117,7 +123,6 @@ def _add(sums: np.ndarray, arm: Vector, d: Vector, n: Vector, m: Vector, sharp: 
 def step_sums(
     points: np.ndarray,
     normals: np.ndarray,
-    on_boundary: np.ndarray,
     places: np.ndarray,
     place_normals: np.ndarray,
     place_at_boundary: np.ndarray,
@@ -147,7 +152,7 @@ def step_sums(
         v = turned(back, row(normals, p))
         m = row(place_normals, n)
         v = (turn * v[0], turn * v[1], turn * v[2])
-        if dot(v, m) < 0.6:
+        if dot(v, m) < SLOPE_OF_PAIR:
             continue
         d = subtract(q, row(places, n))
         across = dot(d, m) / soft
@@ -189,14 +194,14 @@ def judge(
     spacing: float,
     near: float,
     reach: float,
-    sums: np.ndarray,
-) -> None:
-    """Compare every point with the surface of the other scan under a pose; into sums (5,).
+) -> tuple[int, int, float]:
+    """Compare every point with the surface of the other scan under a pose; returns how many agree, how many do not, and squares.
 
-    Sums: 0 points over the other scan's surface and within `near` of it; 1 those between `near` and `reach`, or tilted (two
-    surfaces that cannot both be there); 2 squared distances of the former from the planes; 3 points that by their normals lie on
-    the other side of a thin body; 4 1 - cosine of the normals of the former.
+    Those agree that lie over the surface of the other scan and within `near` of it; the squares are of their distances from it. Those
+    between `near` and `reach`, or tilted, do not: both surfaces cannot be there. Points that by their normals lie on the other side of a
+    thin body count as neither.
     """
+    agreeing, against, squares = 0, 0, 0.0
     for p in range(len(points)):
         q = moved(back, row(points, p))
         n = nearest(boxes, places, q[0], q[1], q[2], reach)
@@ -205,14 +210,14 @@ def judge(
         m = row(place_normals, n)
         d = subtract(q, row(places, n))
         off = dot(d, m)
-        if dot(d, d) - off * off > 2.25 * spacing * spacing:
+        if dot(d, d) - off * off > OVER_PLACE * OVER_PLACE * spacing * spacing:
             continue  # beside the surface of the other scan, not over it
         cosine = turn * dot(turned(back, row(normals, p)), m)
-        if cosine < -0.2:
-            sums[3] += 1.0
-        elif abs(off) <= near and cosine > 0.75:
-            sums[0] += 1.0
-            sums[2] += off * off
-            sums[4] += 1.0 - cosine
+        if cosine < OTHER_SIDE:
+            continue
+        if abs(off) <= near and cosine > SAME_SLOPE:
+            agreeing += 1
+            squares += off * off
         else:
-            sums[1] += 1.0
+            against += 1
+    return agreeing, against, squares

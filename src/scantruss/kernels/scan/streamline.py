@@ -7,9 +7,9 @@ import numpy as np
 from ...runtime.jit import kernel
 from ..geometry.boxes import SearchBoxes, box_index, put_into, slot_of
 
-SIDE_BITS = 3
+SIDE_BITS = 3  # bits of a coordinate that number the boxes along the side of a block
 BLOCK_SIDE = 1 << SIDE_BITS  # boxes along the side of a block
-SIDE_MASK = BLOCK_SIDE - 1
+SIDE_MASK = BLOCK_SIDE - 1  # takes these bits out of a coordinate
 BLOCK_BYTES = BLOCK_SIDE * BLOCK_SIDE  # a bit for each box of a block
 CHOSEN, BLOCKS = 0, 1  # places in `count`
 

@@ -19,7 +19,7 @@ FARTHEST_BOX = 4503599627370496.0  # boxes from the zero of the frame; beyond, a
 COUNT, SUMS = 3, 4  # columns of a row, behind the three numbers of the box
 LARGEST_INT64 = 9223372036854775807  # int64
 ROWS, NOT_FINITE, TOO_FAR = 0, 1, 2  # counters
-BOUNDARY_BOXES = 2  # boxes to every side by which a box at the boundary is told
+BOUNDARY_BOXES = 2  # boxes to every side that show whether a box is at the boundary
 BLEND_RADIUS = 2.0  # radius about its mean within which the means of others count [box]
 BOUNDARY_SHIFT = 0.25  # distance of their centre from its own mean above which a box is at the boundary [box]
 

@@ -24,10 +24,9 @@ POINTS_OF_FIT = 4096  # more than fill a ball of 8 spacings
 FIT_TURNS = 4  # fits, each with the weights that follow from the one before
 KNOWN_TURNS = 3  # fits that turn the plane, too
 OFF_THE_FIT = 1.5  # distance from the fit, in mean ones, at which a point weighs half
-ASIDE = (
-    0.2  # distance of the centre of the points from the middle of the ball, in radii, from which on a plane is fitted
-)
-FEWEST_FOR_QUADRIC, FEWEST_FOR_PLANE = 12, 6
+# distance of the centre of the points from the middle of the ball, in radii, from which on a plane is fitted
+ASIDE = 0.2
+FEWEST_FOR_QUADRIC, FEWEST_FOR_PLANE = 12, 6  # fewest points to which a quadric, or a plane, is fitted
 
 
 @kernel

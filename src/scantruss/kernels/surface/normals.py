@@ -11,11 +11,11 @@ from ..geometry.boxes import SearchBoxes, search
 from ..geometry.vectors import Vector, along, dot, norm, row, smallest_eigenvector, spread_along, subtract, unit
 
 ASIDE_OF_EDGE = 0.25  # least distance of the middle of what is around a sharp edge from it [reach]
-BEHIND = 0.35  # samples nearer than this tell nothing of the two sides of the edge [reach]
+BEHIND = 0.35  # samples nearer than this show neither side of the edge [reach]
 OPENS = 0.4  # share of the distance between both sides that must grow with that from the edge, at least
 NARROWEST, WIDEST = 0.1, 1.0  # tangent of half the angle between both sides, at least and at most
 SCATTER = 0.5  # rms distance of the samples from both sides, at most, in their mean distance from the plane between
-FEWEST_BEHIND = 6  # fewest samples that tell of the two sides
+FEWEST_BEHIND = 6  # fewest samples that show the two sides
 MOST_AROUND_EDGE = 1024  # most samples that are looked at around an edge
 
 

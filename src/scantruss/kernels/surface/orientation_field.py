@@ -15,7 +15,7 @@ import numpy as np
 from ...runtime.jit import kernel
 from ..geometry.vectors import Vector, across, along, cross, dot, norm, row, subtract, unit
 
-SINE_OF_60 = 0.5 * math.sqrt(3.0)
+SINE_OF_60 = 0.5 * math.sqrt(3.0)  # sine of 60 degrees, the height of a regular triangle [sides]
 
 
 class Level(NamedTuple):

@@ -20,7 +20,8 @@ from ..geometry.vectors import Vector, along, cross, dot, norm, row, subtract, u
 from .local_surface import Surface, flood, gather_points, walk
 
 EITHER_SIDE = -2.0  # no cosine is so low: the points of both sides of a ridge count
-TERMS = 8
+TERMS = 8  # terms of the folded surface: k0 to k7
+SLOPE_OF_SIDE, BEND_OF_SIDE, TERMS_OF_SIDE = 1, 2, 4  # of a side: 1, s, s^2 and t, with s the distance from the crest
 # what `fit_fold` writes: place (0:3) and direction (3:6), angle by which the fold turns within a member [radian], gain over a smooth
 # surface (F statistic), rms distance of the points [scan unit]
 BEND, GAIN, OFF, FOUND = 6, 7, 8, 9
@@ -34,9 +35,9 @@ NEAR = 0.375  # points nearer to the line than this are left out where its sides
 MIDDLE_OF_SIDES = 0.5 * (1.0 + NEAR)  # of the points that are taken [radius]
 # how far from the line the sides of a rounded fold may meet, at least and at most [radius]
 LEAST_MEETING, FARTHEST_MEETING = 0.2, 0.4
-SHARP_ENOUGH = 0.7  # angle of a fold from which the place where its sides meet can be told [radian]
+SHARP_ENOUGH = 0.7  # angle of a fold from which the place where its sides meet is certain enough [radian]
 FEWEST_OF_FLANK = 6  # fewest points of a side
-POINTS_OF_FIRST_LOOK = 2  # points of a sample that tell at first sight
+POINTS_OF_FIRST_LOOK = 2  # points of a sample that are looked at first
 
 
 @kernel
@@ -143,15 +144,15 @@ def flank(
     radius: float,
     side: float,
 ) -> tuple[float, float, float, float, bool]:
-    """One side (1 or -1) of a fold in the plane across it, as far as it can be told, which is returned last.
+    """One side (1 or -1) of a fold in the plane across it; whether it could be fitted is returned last.
 
     Its direction and how much it bends [radian]; how far across and how high its middle is [radius].
 
     crest : place of the line across and its height [radius]. Taken are the points between NEAR and 1 radius from it.
     """
     c, e, n = frame
-    term = np.empty(4)
-    across, up = np.zeros((4, 5)), np.zeros((4, 5))
+    term = np.empty(TERMS_OF_SIDE)
+    across, up = np.zeros((TERMS_OF_SIDE, TERMS_OF_SIDE + 1)), np.zeros((TERMS_OF_SIDE, TERMS_OF_SIDE + 1))
     points = 0
     for i in range(taken):
         d = (buffer[i, 0], buffer[i, 1], buffer[i, 2])
@@ -161,21 +162,23 @@ def flank(
             points += 1
             s -= MIDDLE_OF_SIDES
             term[0], term[1], term[2], term[3] = 1.0, s, s * s, dot(d, e) / radius
-            for r in range(4):
-                for k in range(4):
+            for r in range(TERMS_OF_SIDE):
+                for k in range(TERMS_OF_SIDE):
                     across[r, k] += buffer[i, WEIGHT] * term[r] * term[k]
-                across[r, 4] += buffer[i, WEIGHT] * term[r] * u
-                up[r, 4] += buffer[i, WEIGHT] * term[r] * h
-    for r in range(4):
+                across[r, TERMS_OF_SIDE] += buffer[i, WEIGHT] * term[r] * u
+                up[r, TERMS_OF_SIDE] += buffer[i, WEIGHT] * term[r] * h
+    for r in range(TERMS_OF_SIDE):
         across[r, r] += 1e-9 * across[0, 0]
-        for k in range(4):
+        for k in range(TERMS_OF_SIDE):
             up[r, k] = across[r, k]
-    if points < FEWEST_OF_FLANK or not solve(across, 4) or not solve(up, 4):
+    if points < FEWEST_OF_FLANK or not solve(across, TERMS_OF_SIDE) or not solve(up, TERMS_OF_SIDE):
         return 0.0, 0.0, 0.0, 0.0, False
     half = 1.0 - MIDDLE_OF_SIDES
-    outer = math.atan2(up[1, 4] + 2.0 * half * up[2, 4], across[1, 4] + 2.0 * half * across[2, 4])
-    inner = math.atan2(up[1, 4] - 2.0 * half * up[2, 4], across[1, 4] - 2.0 * half * across[2, 4])
-    return math.atan2(up[1, 4], across[1, 4]), outer - inner, across[0, 4], up[0, 4], True
+    slope_across, bend_across = across[SLOPE_OF_SIDE, TERMS_OF_SIDE], across[BEND_OF_SIDE, TERMS_OF_SIDE]
+    slope_up, bend_up = up[SLOPE_OF_SIDE, TERMS_OF_SIDE], up[BEND_OF_SIDE, TERMS_OF_SIDE]
+    outer = math.atan2(slope_up + 2.0 * half * bend_up, slope_across + 2.0 * half * bend_across)
+    inner = math.atan2(slope_up - 2.0 * half * bend_up, slope_across - 2.0 * half * bend_across)
+    return math.atan2(slope_up, slope_across), outer - inner, across[0, TERMS_OF_SIDE], up[0, TERMS_OF_SIDE], True
 
 
 @kernel

@@ -7,11 +7,12 @@ from functools import partial
 from typing import Any
 
 from ...export.drawing.structure import FORCES, SIZES, USED, MemberPicture, draw_members, mode_picture, moved_picture
+from ...structure.checks import use_words
 from ...structure.modes import Modes
 from ...structure.options import settings_text
 from ...structure.path_report import path_words
-from ...structure.report import StructureReport, use_words
-from ...structure.statics import Solution
+from ...structure.report import StructureReport
+from ...structure.results import Solution
 from ...structure.truss import Truss
 from .charts import draw_nonlinear_path, draw_rounds, draw_weights
 from .first_page import first_page

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ...structure.checks import CLAUSES, MemberChecks, span_of
+from ...structure.checks import CLAUSES, MemberChecks, span_of, use_words
 from ...structure.options import StructureSettings
-from ...structure.report import StructureReport, use_words
+from ...structure.report import StructureReport
 from ...structure.truss import Truss
 from .parts import DataTable, Headline, PointList, ReportPart, SectionHead, Sentence
 from .source import ReportSource, cases_of_state, greatest_stress

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...structure.options import StructureSettings
 from ...structure.report import CaseFigures, StructureReport
-from ...structure.statics import CaseResult, Solution
+from ...structure.results import CaseResult, Solution
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,14 +45,9 @@ def axial_force(result: CaseResult) -> np.ndarray:
     return np.where(-low > high, low, high)
 
 
-def judged_results(solution: Solution) -> list[CaseResult]:
-    """Return the results of the ULS combinations, or of all load cases where there are none."""
-    return [each for each in solution.all_results() if each.state == "ULS"] or list(solution.cases)
-
-
 def greatest_stresses(solution: Solution) -> tuple[np.ndarray, list[str]]:
     """Return the (M,) greatest sum of axial and bending stress of each member [Pa], and the names of what causes it."""
-    judged = judged_results(solution)
+    judged = solution.judged_results()
     every = np.stack([np.abs(result.stresses).sum(axis=1) for result in judged])
     return every.max(axis=0), [judged[k].name for k in every.argmax(axis=0)]
 

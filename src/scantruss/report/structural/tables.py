@@ -6,11 +6,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ...structure.report import CaseFigures, StructureReport, chosen_cases, use_words
-from ...structure.statics import CaseResult, Solution
+from ...structure.checks import use_words
+from ...structure.report import CaseFigures, StructureReport
+from ...structure.report_lines import chosen_cases
+from ...structure.results import MOMENT_Y, MOMENT_Z, CaseResult, Solution
 from ...structure.truss import Truss
 from .parts import DataTable, ReportPart, SectionHead, Sentence
-from .source import ReportSource, axial_force, greatest_stresses, judged_results
+from .source import ReportSource, axial_force, greatest_stresses
 from .words import fixed
 
 LISTED_MEMBERS = 20  #: of the table of the members that are used most
@@ -56,7 +58,7 @@ def _reactions(solution: Solution) -> DataTable:
     """Return extremes of the reactions of every support under the ULS combinations, or all cases where there are none."""
     truss = solution.truss
     held = np.flatnonzero(truss.supports.any(axis=1))
-    judged = judged_results(solution)
+    judged = solution.judged_results()
     made = np.stack([result.reactions[held] for result in judged]) / 1e3
     up, size = made[:, :, 2], np.linalg.norm(made[:, :, :3], axis=2)
     columns = {
@@ -115,7 +117,7 @@ def _member_cells(result: CaseResult, member: int, decimals: int) -> tuple[str, 
     """Return mark, nodes, length, section and forces of a member."""
     truss = result.truss
     start, end = truss.members[member]
-    forces = (axial_force(result)[member], *result.greatest[member, 4:6])
+    forces = (axial_force(result)[member], *result.greatest[member, [MOMENT_Y, MOMENT_Z]])
     return (
         truss.member_marks[member],
         f"{truss.node_marks[start]} {truss.node_marks[end]}",

@@ -13,7 +13,7 @@ SUPPORT_KINDS = {"loop": "boundary loop {}", "line": "line {}", "lowest": "nodes
 
 
 def support_words(where: str) -> str:
-    """Return in words which nodes are held, such as "boundary loop 1 and corners of the boundary"."""
+    """Return in words which nodes are supported, such as "boundary loop 1 and corners of the boundary"."""
     found = []
     for word in where.split("+"):
         kind, _, value = word.strip().partition(":")

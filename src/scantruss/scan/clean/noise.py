@@ -95,7 +95,7 @@ def find_layers(near: Nearby, surfaces: Surfaces, distance: float, known: np.nda
     Points `known` (N,) from an earlier round, which are half merged, are included.
 
     Two layers lie at two distances from the surface between them, half of the points at each; noise lies mostly near zero. A
-    patch that holds both equally is several times wider than they are apart. A corrugated surface looks alike, but a narrower
+    patch that holds both equally is several times wider than they are apart. A corrugated surface looks the same, but a narrower
     patch follows it.
 
     Returns

@@ -18,7 +18,7 @@ SIDE_SPACING = 2.0
 LINKS_OF_A_POINT = 10  # links of each of these points
 # thickness, in their spacings, up to which they are smooth enough to reveal a one-sided surface
 ONE_SIDED_THICKNESS = 0.15
-NEIGHBORS_ASKED = 4  # nearest oriented points of a point; the one most in its tangent plane tells its side
+NEIGHBORS_ASKED = 4  # nearest oriented points of a point; the one most in its tangent plane decides its side
 
 
 class OrientedNormals(NamedTuple):

@@ -24,16 +24,14 @@ DOUBT_DISTANCE = 2.0  # distance from the plane of its neighbours, in their thic
 FARTHEST_APART = 1.1  # reach above which points are too far apart for a grid [member lengths]
 # distance to the third neighbour, in reaches of those around and of `distance`, at which a point is an outlier
 LONE_DISTANCE = 0.5
-DENSEST_AROUND = (
-    4  # rank, from the smallest and counted from 0, of the reach around a point that others are compared with
-)
+# rank, from the smallest and counted from 0, of the reach around a point that others are compared with
+DENSEST_AROUND = 4
 POINTS_OF_PATCH = 28  # points of the surface from which the distance of a point is measured
 STANDS_OFF = 5.0  # distance from that surface, in multiples of the expected one, above which a point is off it
 LEAST_EXPECTED = 0.01  # least expected distance, in radii of that surface
 SMALLEST_PART = 8  # fewest doubted points that make a part of a sheet
-OPEN_EDGE = (
-    0.05  # share of them at a free edge above which they are a fringe of the scan, unless they are many and compact
-)
+# share of them at a free edge above which they are a fringe of the scan, unless they are many and compact
+OPEN_EDGE = 0.05
 # fewest of these; most at a free edge, in square roots of their number: hardly more than three sides of a square
 MANY_OF_PART, EDGE_OF_COMPACT = 200, 3.3
 LONE_SHARE = 3e-4  # share of samples without neighbours above which outliers are sought

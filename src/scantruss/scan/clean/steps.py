@@ -57,7 +57,7 @@ def clean_points(
     unit: str = "",
     progress: Progress | None = None,
 ) -> CleanCloud:
-    """Return a clean scan; every step can be switched off by None or False.
+    """Return a clean scan; None or False switches a step off.
 
     Parameters
     ----------
@@ -212,12 +212,12 @@ class _Work:
         else:
             found = self._normals[near.tree.ids]
         oriented = orient_to_one_side(near, near.tree.points, found)
-        said = (
+        words = (
             f"normals turned to one side of {oriented.pieces} pieces"
             if oriented.pieces > 1
             else "normals turned to one side"
         )
         if oriented.one_sided:
-            said += "; the surface is one-sided (like a Moebius strip), so they change sides somewhere"
-        self.add("normals", len(self.points), said)
+            words += "; the surface is one-sided (like a Moebius strip), so they change sides somewhere"
+        self.add("normals", len(self.points), words)
         return near.in_order(oriented.normals)

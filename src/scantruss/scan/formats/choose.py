@@ -32,15 +32,15 @@ def describe_points(points: np.ndarray, attributes: Mapping[str, np.ndarray]) ->
     if not real.any():
         return ""
     held = {name: values[real & np.isfinite(values)] for name, values in attributes.items()}
-    said = []
+    contents = []
     for name, words in (("class", "classes"), ("return_number", "returns")):
         if len(values := held.get(name, NO_VALUES)):
-            said.append(f" {words} {' '.join(f'{value:g}' for value in np.unique(values)[:20])}")
+            contents.append(f" {words} {' '.join(f'{value:g}' for value in np.unique(values)[:20])}")
     if len(values := held.get("confidence", NO_VALUES)):
-        said.append(f" confidence up to {values.max():.4g}")
+        contents.append(f" confidence up to {values.max():.4g}")
     corners = (points[real].min(axis=0), points[real].max(axis=0))
-    said.append(" x, y, z from " + " to ".join(", ".join(f"{c:.8g}" for c in corner) for corner in corners))
-    return ",".join(said)
+    contents.append(" x, y, z from " + " to ".join(", ".join(f"{c:.8g}" for c in corner) for corner in corners))
+    return ",".join(contents)
 
 
 def choose(

@@ -28,7 +28,7 @@ def to_common_unit(
     feet = (content.feet,) if content.feet and own != "foot" and not z_unit else ()
     size, metres = UNITS[common], UNITS[own]
     if size and metres and size != metres:
-        notes = (*notes, f"{path.name} is in {own} and is brought to {common}, the unit of the first file")
+        notes = (*notes, f"{path.name} is in {own} and is converted to {common}, the unit of the first file")
         points, own = points * (metres / size), common
     return points, own, (*content.notes, *notes, *feet)
 
@@ -54,14 +54,14 @@ def to_one_unit(path: Path, content: Content, unit: str, z_unit: str) -> tuple[n
             " such as UTM first (QGIS, PDAL filters.reprojection); where the file is wrong, --unit says the unit"
         )
     notes = []
-    said, metres, z_metres = name_of(content.metres), content.metres, content.z_metres
-    name, scale = unit or said, 1.0
-    if unit and metres and said != unit:
-        notes.append(f"{path.name} says that its unit is {said or f'{metres:g} m'}; --unit {unit} overrides it")
+    named, metres, z_metres = name_of(content.metres), content.metres, content.z_metres
+    name, scale = unit or named, 1.0
+    if unit and metres and named != unit:
+        notes.append(f"{path.name} says that its unit is {named or f'{metres:g} m'}; --unit {unit} overrides it")
         z_metres = None
     elif metres and not name:
         name, scale = "m", metres
-        notes.append(f"the unit of {path.name}, {metres:g} m, has no name here; its points are brought to m")
+        notes.append(f"the unit of {path.name}, {metres:g} m, is not one of ours; its points are converted to m")
     if z_unit and not name:
         raise InputError(f"{path} does not state the unit of x and y; give it with --unit, besides --z-unit {z_unit}")
     z_metres = UNITS[z_unit] or z_metres
@@ -70,6 +70,6 @@ def to_one_unit(path: Path, content: Content, unit: str, z_unit: str) -> tuple[n
         return content.points * scale if scale != 1.0 else content.points, name, tuple(notes)
     other = name_of(z_metres) or f"units of {z_metres:g} m"
     notes.append(
-        f"the heights of {path.name} are in {other}, x and y in {said or name}: the heights are brought to {name}"
+        f"the heights of {path.name} are in {other}, x and y in {named or name}: the heights are converted to {name}"
     )
     return content.points * [scale, scale, z_metres / size], name, tuple(notes)

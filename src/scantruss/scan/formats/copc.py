@@ -19,7 +19,7 @@ from .las_header import HEADER_14, LASZIP, RECORD
 RECORD_NAME = b"copc".ljust(16, b"\0") + b"\1\0"  # user and number of the record that describes the octree
 RECORD_BYTES = 160  # its bytes; it is the first of the file
 ENTRY = np.dtype([("key", "<i4", 4), ("place", "<u8"), ("size", "<i4"), ("count", "<i4")])  # of the table
-TABLE_ELSEWHERE = -1  # count of an entry that tells where more of the table is
+TABLE_ELSEWHERE = -1  # count of an entry that says where more of the table is
 DEEPEST_OCTREE_LEVEL = 30  # level of an octree
 OCTREE_TOLERANCE = 1e-9  # of the octree's side; coordinates are rounded
 
@@ -187,6 +187,6 @@ def _check_places(path: Path, record: Any, boxes: Boxes, rows: np.ndarray) -> No
         ends = np.sort(ends * record.scales[axis] + record.offsets[axis], axis=0)
         if (ends[0] < boxes.lower[rows, axis]).any() or (ends[1] > boxes.upper[rows, axis]).any():
             raise FormatError(
-                f"{path} has points outside the boxes that its COPC table gives them, so --crop may miss some; make it anew,"
-                " or plain LAZ of it (PDAL)"
+                f"{path} has points outside the boxes that its COPC table gives them, so --crop may miss some; write it"
+                " again, or convert it to plain LAZ (PDAL)"
             )

@@ -121,5 +121,5 @@ def _opened(path: Path) -> Iterator[DatasetReader]:
             with raster:
                 yield raster
         except RasterioError as error:  # also an OSError, which would pass
-            said = error.__cause__ or error
-            raise ValueError(str(said).replace(str(path), path.name)) from None
+            cause = error.__cause__ or error
+            raise ValueError(str(cause).replace(str(path), path.name)) from None

@@ -91,7 +91,7 @@ def _glb(path: Path) -> tuple[Gltf, bytes | None]:
 def _json(path: Path, text: bytes) -> Gltf:
     held = json.loads(text.decode("utf-8"))
     if not isinstance(held, dict) or "asset" not in held:
-        raise FormatError(f"{path} is JSON but no glTF: it has no asset; export it again")
+        raise FormatError(f"{path} is JSON but not glTF: it has no asset; export it again")
     return held
 
 

@@ -65,7 +65,7 @@ def read_head(path: Path) -> bytes:
 
 
 def kind_of(head: bytes) -> str:
-    """Return the kind of a file by its first bytes; "" if they tell nothing."""
+    """Return the kind of a file by its first bytes; "" if they are of no known one."""
     for signature, kind in _SIGNATURES:
         if head.startswith(signature):
             return kind
@@ -100,5 +100,5 @@ def reading_as(path: Path, kind: str) -> Iterator[None]:
     except BaseException as error:
         if not (isinstance(error, Exception) or type(error).__name__ == "PanicException"):  # Rust's, not an Exception
             raise
-        said = " ".join((str(error).strip() or type(error).__name__).split())[:120]
-        raise FormatError(f"{path} cannot be read as {kind} ({said}); copy or export it again") from None
+        reason = " ".join((str(error).strip() or type(error).__name__).split())[:120]
+        raise FormatError(f"{path} cannot be read as {kind} ({reason}); copy or export it again") from None

@@ -43,17 +43,17 @@ def read_las(path: Path, wanted: Sequence[str] = (), places_of: Places | None = 
     names = fields_of((*wanted, "return_count"))
     with reading_as(path, "LAS or LAZ"):
         notes = check_header(path)
-        promised, said, chunks = _read(path, names, places_of)
+        promised, described, chunks = _read(path, names, places_of)
     withheld = sum(chunk.left_out.get(WITHHELD, 0) for chunk in chunks)
-    unread = sum(said.unread.values())
+    unread = sum(described.unread.values())
     points = np.concatenate([np.empty((0, 3)), *(chunk.points for chunk in chunks)])
     check_count(path, promised, len(points) + withheld + unread)
     none = np.empty(0, dtype=np.uint8)
     held = [name for name in names if all(name in chunk.attributes for chunk in chunks)]
     attributes = {name: np.concatenate([none, *(chunk.attributes[name] for chunk in chunks)]) for name in held}
-    feet = look_like_feet(points, attributes["return_count"]) if said.z_metres is None else ""
+    feet = look_like_feet(points, attributes["return_count"]) if described.z_metres is None else ""
     left_out = {WITHHELD: withheld} if withheld else {}
-    return replace(said, points=points, attributes=attributes, left_out=left_out, feet=feet, notes=notes)
+    return replace(described, points=points, attributes=attributes, left_out=left_out, feet=feet, notes=notes)
 
 
 def fields_of(wanted: Sequence[str]) -> list[str]:
@@ -123,11 +123,11 @@ def _read(path: Path, names: Sequence[str], places_of: Places | None) -> tuple[i
     with laspy.open(path) as file:
         header: Any = file.header
         system = system_of([*header.vlrs, *(header.evlrs or [])])
-        said = Content(np.empty((0, 3)), {}, system.metres, system.z_metres, system.name, system.degrees)
-        near = records_near(path, header, places_of(said), names) if places_of else None
+        head = Content(np.empty((0, 3)), {}, system.metres, system.z_metres, system.name, system.degrees)
+        near = records_near(path, header, places_of(head), names) if places_of else None
         records, unread = near or (file.chunk_iterator(POINTS_PER_CHUNK), {})
         chunks = [content_of_records(record, names) for record in records]
-    return header.point_count, replace(said, unread=unread), chunks
+    return header.point_count, replace(head, unread=unread), chunks
 
 
 def write_las(path: Path, cloud: Cloud) -> None:
@@ -136,7 +136,7 @@ def write_las(path: Path, cloud: Cloud) -> None:
     Raises
     ------
     InputError
-        The points lie so densely in so wide a box that whole numbers of 32 bits cannot tell them apart.
+        The points lie so densely in so wide a box that whole numbers of 32 bits cannot distinguish them.
     """
     import laspy
     import lazrs

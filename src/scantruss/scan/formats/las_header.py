@@ -11,11 +11,11 @@ import numpy as np
 from ...errors import FormatError
 
 LEAST_HEADER = 227  # bytes, of LAS 1.0 to 1.2
-HEADER_14 = 375
+HEADER_14 = 375  # bytes of the header of LAS 1.4
 WAVES = 227  # where a header from LAS 1.3 on says where packets of waves begin
 LASZIP = 22204  # number of the record that describes how points are packed
 MOST_IN_CHUNK = 1 << 20  # points of one chunk, where the file holds fewer; room is made for all of them
-ONES = (1 << 64) - 1
+ONES = (1 << 64) - 1  # a count of 64 bits that is not known yet
 RECORD, EXTENDED = 54, 60  # bytes of the header of a variable length record, and of an extended one
 
 
@@ -30,7 +30,7 @@ def check_header(path: Path) -> tuple[str, ...]:
         form, width, count = struct.unpack_from("<BHI", head, 104)
         scales = np.frombuffer(head, "<f8", 6, 131)
         if not np.isfinite(scales).all() or not scales[:3].all() or np.abs(scales).max() > 1e50:
-            raise FormatError(f"{path}: scale and offset of its LAS header are no sensible numbers; export it again")
+            raise FormatError(f"{path}: scale and offset of its LAS header are not sensible numbers; export it again")
         if length < LEAST_HEADER or start > size or length + RECORD * records > start:
             raise FormatError(
                 f"{path} ends early: its LAS header promises records and points behind its end; copy it again"

@@ -39,9 +39,9 @@ def read_lengths(path: str | Path) -> list[tuple[float, ...]]:
         try:
             rows.append(tuple(_number(fields[c], layout) for c in (*coordinates, column)))
         except (ValueError, IndexError):
-            said = " ".join(fields)[:60]
+            shown = " ".join(fields)[:60]
             raise FormatError(
-                f"{path}, line {count}: needs four numbers, x y z and the length there, got {said!r}"
+                f"{path}, line {count}: needs four numbers, x y z and the length there, got {shown!r}"
             ) from None
     return rows
 

@@ -8,7 +8,7 @@ import numpy as np
 
 COLOR_ATTRIBUTES = ("red", "green", "blue")
 PACKED_COLOR = "rgb"  # all three in one number, as PCD has them
-MOST_OF_BYTE, MOST_OF_WORD = 255.0, 65535.0
+MOST_OF_BYTE, MOST_OF_WORD = 255.0, 65535.0  # largest value of a colour of 8 bits, of 16 bits
 
 
 def own_colors(attributes: Mapping[str, np.ndarray]) -> np.ndarray | None:

@@ -259,7 +259,7 @@ def _read_words(path: Path, header: PlyHeader, vertex: Element, wanted: Sequence
     try:
         return np.array([[float(words[i]) for i in row] for row in chosen.tolist()])
     except ValueError as error:
-        raise FormatError(f"{path}: a coordinate is no number ({error}); the file is damaged") from None
+        raise FormatError(f"{path}: a coordinate is not a number ({error}); the file is damaged") from None
 
 
 def _walk(path: Path, element: Element, words: list[str], place: int) -> tuple[np.ndarray, int]:

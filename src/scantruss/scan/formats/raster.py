@@ -18,7 +18,7 @@ RASTER_HEAD = re.compile(
     r"\s*(ncols|nrows|xll(?:corner|center)|yll(?:corner|center)|cellsize|dx|dy|nodata_value)[ \t]+(\S+)[ \t]*\r?\n?",
     re.IGNORECASE,
 )
-MOST_CELLS = 1 << 31
+MOST_CELLS = 1 << 31  # cells above which a raster is refused
 
 
 def read_asc(path: Path, wanted: Sequence[str] = ()) -> Content:
@@ -26,18 +26,18 @@ def read_asc(path: Path, wanted: Sequence[str] = ()) -> Content:
     if kind_of(read_head(path)) != RASTER:
         return read_text(path, wanted)
     text = path.read_text(encoding="latin-1")
-    said, start = dict[str, float](), 0
+    head, start = dict[str, float](), 0
     while found := RASTER_HEAD.match(text, start):  # a match is not empty
         try:
-            said[found[1].lower()] = float(found[2])
+            head[found[1].lower()] = float(found[2])
         except ValueError:
-            raise FormatError(f"{path}: {found[1]} is no number; the file is damaged") from None
+            raise FormatError(f"{path}: {found[1]} is not a number; the file is damaged") from None
         start = found.end()
-    columns, rows = (said.get(name, 0.0) for name in ("ncols", "nrows"))
-    wide, high = (said.get(name, said.get("cellsize", 0.0)) for name in ("dx", "dy"))
+    columns, rows = (head.get(name, 0.0) for name in ("ncols", "nrows"))
+    wide, high = (head.get(name, head.get("cellsize", 0.0)) for name in ("dx", "dy"))
     corner = []
     for axis, size in (("x", wide), ("y", high)):
-        middle, edge = said.get(f"{axis}llcenter"), said.get(f"{axis}llcorner")
+        middle, edge = head.get(f"{axis}llcenter"), head.get(f"{axis}llcorner")
         if middle is None and edge is None:
             raise FormatError(f"{path} has no {axis}llcorner; export the raster again")
         corner.append(middle if middle is not None else edge + size / 2 if edge is not None else 0.0)
@@ -52,8 +52,8 @@ def read_asc(path: Path, wanted: Sequence[str] = ()) -> Content:
     try:
         heights = np.array(words, dtype=np.float64).reshape(int(rows), int(columns))
     except ValueError:
-        raise FormatError(f"{path} has a height that is no number; the file is damaged") from None
-    known = np.isfinite(heights) & (heights != said.get("nodata_value", np.nan))
+        raise FormatError(f"{path} has a height that is not a number; the file is damaged") from None
+    known = np.isfinite(heights) & (heights != head.get("nodata_value", np.nan))
     row, column = np.nonzero(known)
     x, y = corner[0] + column * wide, corner[1] + (int(rows) - 1 - row) * high  # the first row is the northernmost
     missing = int(known.size - known.sum())

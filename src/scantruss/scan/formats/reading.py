@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import FormatError, InputError
-from ...runtime.files import nearest_suffix
+from ...runtime.places import nearest_suffix
 from ...selection import Selection
 from ..checks import degrees_note, extent_note, extent_of, single_precision_note
 from ..cloud import PointCloud
@@ -45,7 +45,7 @@ class Part:
 
 
 def read_points(path: FileNames, unit: str = "", selection: Selection | None = None) -> PointCloud:
-    """Return the points of a scan; the format is that of the suffix.
+    """Return the points of a scan; the suffix decides the format.
 
     Parameters
     ----------
@@ -55,14 +55,13 @@ def read_points(path: FileNames, unit: str = "", selection: Selection | None = N
     unit : str
         Unit of the coordinates: mm, cm, m, inch, foot, or "" for what the file says.
     selection : Selection, optional
-        Which points are taken; all by default.
+        Which points are kept; all by default.
 
     Returns
     -------
     PointCloud
-        All points that are taken, in the order of the files, with their normals where all files have them or have faces; colours
-        and other properties are left aside.
-        `notes` says what was left out or converted.
+        All points that are kept, in the order of the files, with normals if all files have normals or faces; colours and other
+        properties are ignored. `notes` says what was left out or converted.
 
     Raises
     ------
@@ -85,16 +84,16 @@ def read_points(path: FileNames, unit: str = "", selection: Selection | None = N
     given = np.concatenate(normals) if len(normals) == len(parts) else None
     cloud = PointCloud.from_array(points, unit=unit, name=name_of_files(path), normals=given)
     left_out = add_counts([*(part.left_out for part in parts), dict(cloud.left_out)])
-    said = system_of_all([(part.system, part.in_system) for part in parts])
+    common_system = system_of_all([(part.system, part.in_system) for part in parts])
     notes = (*notes, *cloud.notes, *degrees_note(cloud), *single_precision_note(cloud))
-    return replace(cloud, notes=notes, left_out=tuple(left_out.items()), system=said)
+    return replace(cloud, notes=notes, left_out=tuple(left_out.items()), system=common_system)
 
 
 def read_part(path: Path, unit: str, selection: Selection, common: str = "") -> Part:
     """Return the selected points of one file, brought to the unit `common` where its own is known; see `read_points`."""
 
-    def places_of(said: Content) -> list[WantedBox]:
-        return places_in_file(path, said, unit, selection, common)
+    def places_of(header: Content) -> list[WantedBox]:
+        return places_in_file(path, header, unit, selection, common)
 
     wanted = (*selection.needs, *(NORMAL_COLUMNS if path.suffix.lower() in WITH_NORMALS else ()))
     content = read_content(path, wanted, places_of if selection.crop else None)
@@ -103,9 +102,9 @@ def read_part(path: Path, unit: str, selection: Selection, common: str = "") -> 
     return select(path, content, unit, selection, common)
 
 
-def places_in_file(path: Path, said: Content, unit: str, selection: Selection, common: str) -> list[WantedBox]:
+def places_in_file(path: Path, header: Content, unit: str, selection: Selection, common: str) -> list[WantedBox]:
     """Return the boxes around what is cropped in the unit of a file, by what it says."""
-    scale, _, _ = to_common_unit(path, replace(said, points=np.ones((1, 3))), unit, selection.z_unit, common)
+    scale, _, _ = to_common_unit(path, replace(header, points=np.ones((1, 3))), unit, selection.z_unit, common)
     return places_in(selection.crop, scale[0])
 
 
@@ -171,12 +170,12 @@ def joint_notes(
 ) -> tuple[str, tuple[str, ...]]:
     """Return the unit of all files of a scan, "" if none says one, and the notes on them, each once."""
     unit = next((unit for unit in units if unit), "")
-    said: dict[str, None] = {}
+    once: dict[str, None] = {}
     for file, own, words in zip(files, units, notes, strict=True):
-        said.update(dict.fromkeys(words))
+        once.update(dict.fromkeys(words))
         if unit and not own:
-            said[f"{file.name} does not state its unit and is taken to be in {unit} like the others"] = None
-    return unit, tuple(said)
+            once[f"{file.name} does not state its unit and is taken to be in {unit} like the others"] = None
+    return unit, tuple(once)
 
 
 def left_out_note(parts: Sequence[Mapping[str, int]]) -> tuple[str, ...]:
@@ -224,7 +223,7 @@ def _nothing_left(files: Sequence[Path], parts: Sequence[Part]) -> Exception:
             f"{files[0]} holds no points" if len(files) == 1 else f"none of {len(files)} files holds points"
         )
     left_out = add_counts([part.left_out for part in parts])
-    said = ", ".join(f"{number:,} {words}" for words, number in left_out.items() if number)
+    counts = ", ".join(f"{number:,} {words}" for words, number in left_out.items() if number)
     held = next((part.held for part in parts if part.held), "")
     has = f"; {'the scan has' if len(parts) == 1 else 'some of them have'}{held}" if held else ""
-    return InputError(f"no point of {name_of_files(files)} is left: of {count:,} points {said}{has}")
+    return InputError(f"no point of {name_of_files(files)} is left: of {count:,} points {counts}{has}")

@@ -228,9 +228,9 @@ def read_ragged(
 
 def _no_point(path: Path, layout: Layout, number: int, row: Sequence[str]) -> FormatError:
     columns = ", ".join(str(column + 1) for column in layout.columns[-3:])
-    said = " ".join(row)[:60]
+    shown = " ".join(row)[:60]
     return FormatError(
-        f"{path}: line {number} ({said!r}) has no numbers x, y, z in columns {columns}; correct or delete it"
+        f"{path}: line {number} ({shown!r}) has no numbers x, y, z in columns {columns}; correct or delete it"
     )
 
 
@@ -267,7 +267,7 @@ def _check_names(
     if found is None or found != layout.columns or _differs(path, names.names, found, layout):
         raise FormatError(
             f"{path}: line {count_before() + names.number} ({names.line.strip()[:60]!r}) names the columns again,"
-            " but not as before; make a file of each part"
+            " but not as before; save each part as a file"
         )
 
 

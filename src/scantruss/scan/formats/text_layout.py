@@ -161,9 +161,9 @@ def _check_not_thousands(path: Path, rows: Sequence[str]) -> None:
     """Refuse "1,234","2,345" if nothing shows that the commas within the quotes are decimal signs."""
     fields = [field for row in rows for field in split_line(row, ",") if NUMBER_COMMA.fullmatch(field)]
     if any("." in field for field in fields) or all(THOUSANDS.fullmatch(field) for field in fields):
-        said = next(field for field in fields if "," in field)
+        shown = next(field for field in fields if "," in field)
         raise FormatError(
-            f'{path}: the comma in "{said}" may be a decimal sign or stand between thousands; export it with decimal points'
+            f'{path}: the comma in "{shown}" may be a decimal sign or stand between thousands; export it with decimal points'
         )
 
 
@@ -175,9 +175,9 @@ def _check_not_split_in_two(path: Path, rows: Sequence[str]) -> None:
     for first in (1, 2):  # the first field may be the number of the point
         behind = [[row[first + 2 * axis] for row in split if first + 2 * axis < len(row)] for axis in range(3)]
         if all(any(re.fullmatch(r"0\d+", field) for field in fields) for fields in behind):
-            said = ",".join(split[0])[:60]
+            shown = ",".join(split[0])[:60]
             raise FormatError(
-                f"{path}: in {said!r} commas are decimal signs and separate the numbers too; export it with decimal points, or with"
+                f"{path}: in {shown!r} commas are decimal signs and separate the numbers too; export it with decimal points, or with"
                 " semicolons between the numbers"
             )
 

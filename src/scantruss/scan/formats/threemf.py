@@ -81,10 +81,10 @@ def _root(path: Path) -> ElementTree.Element:
     with reading_as(path, "3MF"), zipfile.ZipFile(path) as package:
         names = package.namelist()
         relations = package.read("_rels/.rels").decode("utf-8") if "_rels/.rels" in names else ""
-        said = re.search(r'Target="/?([^"]+\.model)"', relations)
-        name = said[1] if said else MODEL_PART
+        target = re.search(r'Target="/?([^"]+\.model)"', relations)
+        name = target[1] if target else MODEL_PART
         if name not in names:
-            raise FormatError(f"{path} is no 3MF file but a zip archive; a 3MF file holds a 3D model")
+            raise FormatError(f"{path} is a zip archive but not a 3MF file, which holds a 3D model")
         check_size(path, package.getinfo(name).file_size)
         text = package.read(name)
         if b"<!DOCTYPE" in text:

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import FormatError, InputError
-from ...runtime.files import SaveTogether, check_place
+from ...runtime.files import SaveTogether
+from ...runtime.places import check_place
 from ..units import check_unit
 from .content import Cloud
 from .table import WRITERS, Writer

@@ -1,18 +1,18 @@
 """Scans that would fit elsewhere as well: each is tested against all the others together, in every plausible place.
 
 On a shape that looks the same when rotated, or slides on itself, scans agree in a wrong place as well as in the right one, and
-nothing in them tells which is which.
+nothing in them shows which is which.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
-from ...runtime.parallel import processors
+from ...runtime.parallel import threaded_map
 from .features import find_features
 from .graph import Group, apart, links_of
 from .pairs import Pair, find_pair, judge_views, settled_from
@@ -44,16 +44,8 @@ def leave_out_doubtful(
     left_out: set[int] = set()
     while len(group.members) > 1:
         asked = [i for i in group.members if i not in sure]
-        pool = ThreadPoolExecutor(processors())
-        try:
-            tasks = [pool.submit(_fits_elsewhere, scans, group, i) for i in asked]
-            found = set()
-            for place, (i, task) in enumerate(zip(asked, tasks, strict=True)):
-                progress("doubt", place / len(asked))
-                if task.result():
-                    found.add(i)
-        finally:
-            pool.shutdown(cancel_futures=True)
+        doubtful = threaded_map(partial(_fits_elsewhere, scans, group), asked, partial(progress, "doubt"))
+        found = {i for i, doubt in zip(asked, doubtful, strict=True) if doubt}
         if not found:
             break
         kept = _largest_linked(scans, group, found)

@@ -15,7 +15,7 @@ from ...kernels.scan import features as kernels
 from ...runtime.parallel import run_in_parts
 from .views import View
 
-ANGLE_BINS = 11
+ANGLE_BINS = 11  # bins of each of the three angles of a feature
 FEATURE_REACH = 6.0  # radius of a feature, in spacings of the view
 FEATURE_STEPS = 1000.0  # steps to which a feature is rounded
 VALUES_FOR_BINS = 200_000  # values of each scan from which the bins are found

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...kernels.scan import overlap as kernels
+from ...kernels.scan.overlap import MOTION
 from .poses import invert, small_motion
 from .views import View
 
@@ -70,7 +71,7 @@ def align(
             count = add_pairs(sums, first, second, pose, np.eye(4), turn, reach, centre, every)
             if count < 6:
                 return pose
-            step = solve_step(sums[:6, :6], sums[:6, 6], 0.5 * size)
+            step = solve_step(sums[:MOTION, :MOTION], sums[:MOTION, MOTION], 0.5 * size)
             pose = small_motion(step[:3], step[3:], centre[0]) @ pose
             if np.linalg.norm(step[:3]) * size + np.linalg.norm(step[3:]) < LAST_STEP * first.spacing:
                 break
@@ -97,12 +98,12 @@ def add_pairs(
     ):
         part = np.zeros((7, 7))
         count += kernels.step_sums(
-            a.points, a.normals, a.on_boundary, b.points, b.normals, b.on_boundary, b.boxes,
+            a.points, a.normals, b.points, b.normals, b.on_boundary, b.boxes,
             np.ascontiguousarray(one), np.ascontiguousarray(invert(other) @ one),
             turn, every, reach, soft, PLANE_STIFFNESS, centre, part,
         )  # fmt: skip
-        part[6, :6] *= sign
-        part[:6, 6] *= sign
+        part[MOTION, :MOTION] *= sign
+        part[:MOTION, MOTION] *= sign
         sums += part
     return count
 
@@ -128,15 +129,15 @@ def solve_step(stiffness: np.ndarray, load: np.ndarray, arm: float) -> np.ndarra
 
 def judge(first: View, second: View, pose: np.ndarray, turn: float, near: float, reach: float) -> Fit:
     """Return how two scans agree under a pose (4, 4) of the first in the frame of the second; near and reach [scan unit]."""
-    shares, over, sums = [], [], np.zeros(5)
+    shares, over = [], []
+    all_agreeing, all_against, all_squares = 0, 0, 0.0
     for a, b, back in ((first, second, pose), (second, first, invert(pose))):
-        part = np.zeros(5)
-        kernels.judge(
+        agreeing, against, squares = kernels.judge(
             a.points, a.normals, b.points, b.normals, b.on_boundary, b.boxes,
-            np.ascontiguousarray(back), turn, b.spacing, near, reach, part,
+            np.ascontiguousarray(back), turn, b.spacing, near, reach,
         )  # fmt: skip
-        shares.append(part[0] / max(len(a.points), 1))
-        over.append((part[0] + part[1]) / max(len(a.points), 1))
-        sums += part
-    residual = float(np.sqrt(sums[2] / max(sums[0], 1.0)))
-    return Fit(int(sums[0]), int(sums[1]), float(max(shares)), residual, near, float(max(over)))
+        shares.append(agreeing / max(len(a.points), 1))
+        over.append((agreeing + against) / max(len(a.points), 1))
+        all_agreeing, all_against, all_squares = all_agreeing + agreeing, all_against + against, all_squares + squares
+    residual = float(np.sqrt(all_squares / max(all_agreeing, 1)))
+    return Fit(all_agreeing, all_against, float(max(shares)), residual, near, float(max(over)))

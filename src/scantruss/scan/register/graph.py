@@ -1,7 +1,7 @@
 """The pose graph: scans joined pair by pair, the surest pairs first; a pair that contradicts earlier ones is rejected.
 
 Joined scans are a group. A pair between two groups puts every scan of one over every scan of the other, and all of them must
-agree: that tells a wrong pair, which may look right by itself, from a right one.
+agree: that distinguishes a wrong pair, which may look right on its own, from a right one.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...kernels.scan.overlap import MOTION
 from .fine import Fit, add_pairs, judge, solve_step
 from .pairs import DISAGREEING_DISTANCE, Pair, judge_views, nearness
 from .poses import invert, move, small_motion
@@ -251,12 +252,12 @@ def _step(
         add_pairs(sums, a, b, group.poses[i], group.poses[j], turn, reach * a.spacing, centre, every)
         sums *= fit.share**2
         p, q = (slice(6 * place[k], 6 * place[k] + 6) for k in (i, j))
-        stiffness[p, p] += sums[:6, :6]
-        stiffness[q, q] += sums[:6, :6]
-        stiffness[p, q] -= sums[:6, :6]
-        stiffness[q, p] -= sums[:6, :6]
-        load[p] += sums[:6, 6]
-        load[q] -= sums[:6, 6]
+        stiffness[p, p] += sums[:MOTION, :MOTION]
+        stiffness[q, q] += sums[:MOTION, :MOTION]
+        stiffness[p, q] -= sums[:MOTION, :MOTION]
+        stiffness[q, p] -= sums[:MOTION, :MOTION]
+        load[p] += sums[:MOTION, MOTION]
+        load[q] -= sums[:MOTION, MOTION]
     moves = np.zeros((count, 6))
     if count > 1:
         moves[1:] = solve_step(stiffness[6:, 6:], load[6:], 0.5 * size).reshape(-1, 6)

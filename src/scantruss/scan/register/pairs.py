@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import partial
+from itertools import chain
 
 import numpy as np
 
-from ...runtime.parallel import processors
+from ...runtime.parallel import threaded_map
 from .fine import Fit, align, judge
 from .matching import find_candidates
 from .scans import Scan
@@ -26,9 +27,8 @@ SURE_SIDE = 0.6  # certainty that normals face outwards above which the other si
 LEAST_OVERLAP = 0.03  # overlap below which a pair is not considered
 LEAST_AGREEMENT = 0.6  # agreement below which a pair is not considered
 NOISES_WITHIN = 3.0  # distance within which two scans agree, in the noise of both together
-LEAST_AGREEING_DISTANCE = (
-    0.15  # least distance within which two scans agree, in spacings of the view; scanners distort slightly
-)
+# least distance within which two scans agree, in spacings of the view; scanners distort slightly
+LEAST_AGREEING_DISTANCE = 0.15
 LARGEST_AGREEING_DISTANCE = 0.5  # largest distance within which two scans agree, in spacings of the view
 RESIDUALS_WITHIN = 3.0  # distance within which two scans agree, in residuals of pairs taken as right
 LEAST_DISTANCE_SHARE = 0.35  # least share of their usual distance to which the residuals reduce it
@@ -66,17 +66,11 @@ def find_pairs(
     progress: Callable[[str, float], None],
 ) -> list[Pair]:
     """Return the plausible pairs, up to `POSES_KEPT` for two scans; `wanted` selects the two."""
-    todo = list(wanted)
-    found: list[Pair] = []
-    pool = ThreadPoolExecutor(processors())
-    try:
-        tasks = [pool.submit(find_pair, scans, features, first, second) for first, second in todo]
-        for place, task in enumerate(tasks):
-            progress("match", place / len(tasks))
-            found += task.result()
-    finally:
-        pool.shutdown(cancel_futures=True)
-    return found
+
+    def plausible(two: tuple[int, int]) -> list[Pair]:
+        return find_pair(scans, features, *two)
+
+    return list(chain.from_iterable(threaded_map(plausible, list(wanted), partial(progress, "match"))))
 
 
 def find_pair(

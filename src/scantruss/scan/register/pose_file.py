@@ -30,7 +30,7 @@ def read_poses(path: str | Path) -> dict[str, np.ndarray]:
     except OSError as error:
         raise FormatError(f"cannot read poses {path}: {error.strerror}") from None
     except (ValueError, RecursionError) as error:
-        raise FormatError(f"{path} is no JSON file of poses: {error}") from None
+        raise FormatError(f"{path} is not a JSON file of poses: {error}") from None
     scans = values.get("scans", values) if isinstance(values, dict) else None
     if not isinstance(scans, dict) or not scans:
         raise FormatError(f'{path} holds no poses; it needs an object of scans by name, each with a 4 x 4 "matrix"')
@@ -55,7 +55,7 @@ def _pose_of(value: Any, where: str) -> np.ndarray:
         or np.abs(pose[3] - [0, 0, 0, 1]).max() > SKEW
     ):
         raise FormatError(
-            f"{where}: the matrix is no rigid motion; it needs a rotation and a translation, without scale"
+            f"{where}: the matrix is not a rigid motion; it needs a rotation and a translation, without scale"
         )
     return make_pose(u @ v, pose[:3, 3])
 

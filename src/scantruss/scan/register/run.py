@@ -134,8 +134,8 @@ def _checked_names(clouds: Sequence[PointCloud], names: Sequence[str]) -> list[s
         named = [f"scan {place + 1}" for place in range(len(clouds))]
     units = {cloud.unit: name for cloud, name in zip(clouds, named, strict=True) if cloud.unit}
     if len(units) > 1:
-        said = ", ".join(f"{name} is in {unit}" for unit, name in units.items())
-        raise InputError(f"the scans must be in one unit: {said}; convert them, or give the unit of all with --unit")
+        words = ", ".join(f"{name} is in {unit}" for unit, name in units.items())
+        raise InputError(f"the scans must be in one unit: {words}; convert them, or give the unit of all with --unit")
     return named
 
 
@@ -180,13 +180,13 @@ def _why_not(scans: list[Scan], names: list[str], groups: list[Group], doubtful:
 
     mute = listed(i for i, scan in enumerate(scans) if not scan.tells)
     parts = "; ".join(" and ".join(listed(group.members)) for group in groups if len(group.members) > 1)
-    said = f"only {parts} do" if parts else "no overlap tells how they lie"
+    words = f"only {parts} do" if parts else "no overlap tells how they lie"
     if mute:
-        said += f", and {', '.join(mute)} have too few points for the size of the others, or are in another unit"
+        words += f", and {', '.join(mute)} have too few points for the size of the others, or are in another unit"
     if doubtful:
-        said = f"{', '.join(listed(doubtful))} fit in more ways than one, as parts of a symmetric shape do"
+        words = f"{', '.join(listed(doubtful))} fit in more ways than one, as parts of a symmetric shape do"
     return (
-        f"the scans {', '.join(names)} do not fit together: {said}; give scans that overlap more, or poses to start from"
+        f"the scans {', '.join(names)} do not fit together: {words}; give scans that overlap more, or poses to start from"
         " (--poses)"
     )
 

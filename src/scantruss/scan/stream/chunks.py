@@ -123,14 +123,14 @@ def _las(tile: Tile, reading: Reading, size: int, alone: bool) -> Iterator[Conte
             record: Any = file.read_points(expected)
             short = len(record) < expected
             begin += len(record)
-            yield tile.source.said_of(content_of_records(record, names))
+            yield tile.source.applied_to(content_of_records(record, names))
     if short:
         check_count(path, tile.source.points, begin)
 
 
 def _near(source: Source, names: Sequence[str], records: Iterator[Any], unread: dict[str, int]) -> Iterator[Content]:
     for record in records:
-        yield replace(source.said_of(content_of_records(record, names)), unread=unread)
+        yield replace(source.applied_to(content_of_records(record, names)), unread=unread)
         unread = {}
 
 
@@ -138,8 +138,8 @@ def _places_of(source: Source, reading: Reading) -> list[WantedBox]:
     """Return the boxes around what is cropped in the unit of a file that may be COPC; none of others."""
     if not (source.in_one and reading.selection.crop):
         return []
-    said = source.said_of(Content(np.empty((0, 3))))
-    return places_in_file(source.path, said, reading.unit, reading.selection, reading.common)
+    header = source.applied_to(Content(np.empty((0, 3))))
+    return places_in_file(source.path, header, reading.unit, reading.selection, reading.common)
 
 
 def count_unread(source: Source, reading: Reading) -> int:
@@ -167,14 +167,14 @@ def _fixed_rows(tile: Tile, wanted: Sequence[str], size: int) -> Iterator[Conten
                 raise FormatError(f"{source.path} ends early: it has become shorter while it was read")
             with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is left out later
                 points = np.stack([rows[axis].astype(np.float64, copy=False) for axis in "xyz"], axis=1)
-            yield source.said_of(Content(points, {attribute: rows[name] for attribute, name in found.items()}))
+            yield source.applied_to(Content(points, {attribute: rows[name] for attribute, name in found.items()}))
 
 
 def _whole(tile: Tile, wanted: Sequence[str]) -> Iterator[Content]:
     source = tile.source
     content = read_content(source.path, wanted)
     if (content.metres, content.z_metres) != (source.metres, source.z_metres):
-        raise FormatError(f"{source.path} says another unit than before; thin it when nobody writes to it")
+        raise FormatError(f"{source.path} states another unit than before; thin it while nothing writes to it")
     yield content
 
 
@@ -203,4 +203,4 @@ def _text(tile: Tile, counts: list[int]) -> Iterator[Content]:
                     rows = rows[:, 1:]
                 more = {name: rows[:, 3 + i] for i, (name, _) in enumerate(layout.attributes)}
                 left_out = {EMPTY_LINES: empty} if empty else {}
-                yield source.said_of(Content(rows[:, :3], more, left_out=left_out))
+                yield source.applied_to(Content(rows[:, :3], more, left_out=left_out))

@@ -42,15 +42,15 @@ def open_scan(names: FileNames, unit: str = "", selection: Selection | None = No
     sources = [find_source(path, selection.needs) for path in files]
     check_systems(files, [source.system for source in sources])
     units: list[str] = []
-    said, systems = [], []
+    all_notes, systems = [], []
     none = Content(np.empty((0, 3)))
     for source in sources:
         common = next((own for own in units if own), "")
-        _, own, notes = to_common_unit(source.path, source.said_of(none), unit, selection.z_unit, common)
+        _, own, notes = to_common_unit(source.path, source.applied_to(none), unit, selection.z_unit, common)
         units.append(own)
-        said.append(notes)
-        systems.append((source.system, stays_in_system(source.said_of(none), own)))
-    common, notes = joint_notes(files, units, said)
+        all_notes.append(notes)
+        systems.append((source.system, stays_in_system(source.applied_to(none), own)))
+    common, notes = joint_notes(files, units, all_notes)
     airborne = next((source for source in sources if source.kind == "las"), None)
     if airborne and airborne.z_metres is None and common != "foot" and not selection.z_unit:
         notes = (*notes, *filter(None, [note_on_heights(airborne.path)]))

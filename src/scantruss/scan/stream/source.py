@@ -35,10 +35,10 @@ class Source:
         """Whether it can only be read whole, with memory for all of its points."""
         return self.kind == "whole"
 
-    def said_of(self, content: Content) -> Content:
-        """Return some of its points with the units of the header."""
-        said = replace(content, metres=self.metres, z_metres=self.z_metres, system=self.system, degrees=self.degrees)
-        return replace(said, notes=(*content.notes, *self.notes)) if self.notes else said
+    def applied_to(self, content: Content) -> Content:
+        """Return some of its points with the units, the system and the notes of its header."""
+        applied = replace(content, metres=self.metres, z_metres=self.z_metres, system=self.system, degrees=self.degrees)
+        return replace(applied, notes=(*content.notes, *self.notes)) if self.notes else applied
 
 
 @dataclass(frozen=True)

@@ -229,7 +229,7 @@ def _tiles_for(sources: Sequence[Source], workers: Workers) -> _Tiles:
 
 
 def _rows_of(tile: Tile, shared: tuple[Reading, float, bool]) -> tuple[BoxRows, ReadSummary]:
-    """Return the boxes of a tile and what its chunks tell: the work of a worker."""
+    """Return the boxes of a tile and what its chunks report: the work of a worker."""
     reading, spacing, boundary = shared
     thinning, summary = Thinning(spacing, boundary=boundary), ReadSummary()
     for chunk in _chunks_there(tile, reading):
@@ -280,7 +280,7 @@ def _nothing(sources: Sequence[Source], rows: BoxRows, summary: ReadSummary) -> 
     where = str(sources[0].path) if len(sources) == 1 else f"none of the {len(sources)} files"
     if rows.points or not summary.read:
         return FormatError(f"{where} holds {'no points but NaN or infinite ones' if rows.points else 'no points'}")
-    said = ", ".join(f"{number:,} {words}" for words, number in summary.left_out.items() if number)
+    counts = ", ".join(f"{number:,} {words}" for words, number in summary.left_out.items() if number)
     name = name_of_files([source.path for source in sources])
     have = f"; some of them have{summary.held}" if summary.held else ""
-    return InputError(f"no point of {name} is left: of {summary.read:,} points {said}{have}")
+    return InputError(f"no point of {name} is left: of {summary.read:,} points {counts}{have}")

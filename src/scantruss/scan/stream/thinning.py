@@ -57,7 +57,7 @@ class Thinning:
     spacing : float
         Side of a box [scan unit].
     boundary : bool
-        Keep the extremes of each box too, so that `points_at_boundary` can tell the boundary.
+        Keep the extremes of each box too, so that `points_at_boundary` can find the boundary.
     """
 
     def __init__(self, spacing: float, *, boundary: bool = False) -> None:
@@ -212,7 +212,7 @@ def nearest_of_parts(count: int, parts: Iterable[Nearest]) -> np.ndarray:
             same &= new[:, c] == held[:, c]
         best[part.row[better]] = new[better]
     if not np.isfinite(best[:, 0]).all():
-        raise InputError("the scan has changed while it was read; thin it again when nobody writes to it")
+        raise InputError("the scan has changed while it was read; thin it again while nothing writes to it")
     return np.ascontiguousarray(best[:, 1:])
 
 
