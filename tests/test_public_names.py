@@ -23,7 +23,7 @@ reveal_type(grid.certificate)
 def typed_names() -> set[str]:
     """Names that type checkers find in the package."""
     tree = ast.parse((ROOT / "src" / "scantruss" / "__init__.py").read_text(encoding="utf-8"))
-    guarded = [node for node in tree.body if isinstance(node, ast.If)]
+    guarded = [node for node in tree.body if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING"]
     imports = [node for node in ast.walk(guarded[0]) if isinstance(node, ast.ImportFrom)]
     return {alias.asname for node in imports for alias in node.names if alias.asname}
 

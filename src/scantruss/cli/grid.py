@@ -263,7 +263,10 @@ def nearby_words(bars: Bars, cloud: PointCloud, settings: Settings, advice: Advi
         return f"; no grid passes with the lengths tried, {lengths}, either: clean or crop the scan where it fails"
     if (length := Advice(cloud, settings, bars).nearby(settings.length)) is not None:
         return f"; a grid passes with --length {length:g} ({f'{cloud.unit}, ' if cloud.unit else ''}tried with --effort quick)"
-    return f"; no grid passes with the lengths tried near {settings.length:g}{unit} either: clean or crop the scan where it fails"
+    return (
+        f"; no grid passes with the lengths tried near {settings.length:g}{unit} either: scantruss info looks for one farther off,"
+        " else clean or crop the scan where it fails"
+    )
 
 
 def draw_refusal(
