@@ -37,6 +37,7 @@ def test_a_turntable_tells_how_far_it_is_and_can_be_stopped(stops_at: int | None
     view: Any = SimpleNamespace(
         session=session,
         step=lambda step: step,
+        aside=lambda step: step,
         say=lambda words: None,
         look=SimpleNamespace(tubes=SimpleNamespace(value=False), dark=SimpleNamespace(value=False)),
         scene=SimpleNamespace(api=SimpleNamespace(set_background_image=lambda image: None)),

@@ -14,7 +14,7 @@ from .session import Session
 from .typed_fields import TypedFields
 from .worker import words_of
 
-Step = Callable[[], None]
+Act = Callable[[], None]
 Call = Callable[[Any], Coroutine[Any, Any, None]]
 """What viser calls with an event, and awaits."""
 
@@ -26,7 +26,7 @@ class Presses:
         self.session = session
         self.in_order = InOrder()
         self._typed = TypedFields(self.in_order, self.do)
-        self._sliding: list[Step] = []  # steps of sliders that are still to come
+        self._sliding: list[Act] = []  # steps of sliders that are still to come
 
     @abstractmethod
     def update(self) -> None:
@@ -38,7 +38,7 @@ class Presses:
 
     # ---- what controls call
 
-    def step(self, step: Step) -> Call:
+    def step(self, step: Act) -> Call:
         """Return what a control calls to take a step, after what was just typed."""
         return self.chosen(lambda _: step())
 
@@ -51,7 +51,7 @@ class Presses:
 
         return call
 
-    def slid(self, step: Step) -> Call:
+    def slid(self, step: Act) -> Call:
         """Return what a slider calls: of values that come faster than steps are taken, the newest counts."""
 
         def take() -> None:
@@ -65,7 +65,7 @@ class Presses:
 
         return call
 
-    def aside(self, step: Step) -> Call:
+    def aside(self, step: Act) -> Call:
         """Return what a control calls to take a step that lasts, while others go on."""
 
         def begin() -> None:
@@ -73,7 +73,7 @@ class Presses:
 
         return self.step(begin)
 
-    def typed(self, field: Any, step: Step) -> None:
+    def typed(self, field: Any, step: Act) -> None:
         """Take a step when no more is typed into a text field."""
         self._typed.on_typed(field, step)
 
@@ -87,7 +87,7 @@ class Presses:
         if self._typed.take():
             self.do(lambda: take(value))
 
-    def do(self, step: Step) -> bool:
+    def do(self, step: Act) -> bool:
         """Take a step; what is refused is said on the page. Return whether it was taken."""
         refused = False
         try:
@@ -101,7 +101,7 @@ class Presses:
         self.update()
         return not refused
 
-    def do_quietly(self, step: Step) -> None:
+    def do_quietly(self, step: Act) -> None:
         """Take a step of which there are many a second; what is refused is said on the page."""
         try:
             step()
