@@ -30,7 +30,9 @@ class Evenness:
     angles: float  #: share of the corner angles that are right
     regular: float  #: share of inner nodes with four members, or three
     boundary: float  #: farthest that the boundary of the scan is from that of the grid [members]
-    corners: float  #: farthest that a corner is from a node, along the surface: the curves are smooth across it [members]
+    corners: (
+        float  #: farthest that a corner is from a node, along the surface: the curves are smooth across it [members]
+    )
     planarity: float
     from_scan: float  #: farthest node from the scan [members]
     seconds: float  #: of the processor, triangles included

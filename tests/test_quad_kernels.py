@@ -4,17 +4,21 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from rough import no_boundary
+from rough import curve_of, no_boundary
 
 from scantruss.kernels.boundary.curves import Curves
 from scantruss.kernels.cells.collapse import collapse_edges
 from scantruss.kernels.cells.quads import (
     FLAT,
+    SAG_REACH,
     corner_energy,
     energy_of_quads,
     node_energy,
+    sag_around,
+    sag_of,
     settle_quads,
     side_energy,
+    way_on_curve,
 )
 from scantruss.kernels.cells.trial import TRIAL_SWEEPS, QuadNet, shares_of, try_quads
 from scantruss.kernels.surface.local_surface import CENTRE, NORMAL, PATCH_COLUMNS, TANGENT
@@ -158,6 +162,64 @@ def test_nodes_of_the_boundary_slide_along_it() -> None:
     assert lattice.nodes == pytest.approx(lattice.squares, abs=1e-3)
     assert lattice.arc[1:SIZE] == pytest.approx(lattice.nodes[1:SIZE, 0])
     assert (lattice.nodes[1:SIZE, 1] == 0.0).all()
+
+
+def circle(points: int = 3600) -> tuple[Curves, np.ndarray]:
+    """A circle of radius 1, and its points."""
+    turn = 2 * np.pi * np.arange(points) / points
+    places = np.column_stack([np.cos(turn), np.sin(turn), 0 * turn])
+    return curve_of(places), places
+
+
+@pytest.mark.parametrize("degrees", [5, 40, 90])
+def test_the_sag_of_a_member_is_that_of_an_arc_over_its_chord(degrees: int) -> None:
+    curves, places = circle()
+    a, b = places[100], places[100 + 10 * degrees]
+    way = 10 * degrees * float(curves.total[0]) / len(places)
+    found = sag_of(curves, 0, float(curves.arc[100]), way, tuple(a.tolist()), tuple(b.tolist()), 0.5)
+    assert found == pytest.approx((1 - np.cos(np.radians(degrees / 2))) / 0.5, rel=1e-3)
+
+
+def test_the_way_to_a_node_is_the_shorter_one_and_none_where_it_is_not_near_on_the_curve() -> None:
+    curves, places = circle()
+    total, step = float(curves.total[0]), 20
+    nodes = places[[0, step, len(places) - step, step, step, len(places) // 2]]
+    arc = curves.arc[[0, step, len(places) - step, 0, step, len(places) // 2]].copy()
+    held, curve = np.array([ALONG, ALONG, ALONG, AT_REST, ALONG, ALONG]), np.array([0, 0, 0, 0, 1, 0])
+
+    def way(u: int, target: float = 0.1) -> float:
+        return float(way_on_curve(nodes, held, curve, arc, curves, 0, 0.0, u, target))
+
+    on = step * total / len(places)
+    assert [way(1), way(2)] == pytest.approx([on, -on])
+    assert way(3) == pytest.approx(on)  # a corner is looked for on the curve
+    assert way(4) == 0.0  # on another curve
+    assert way(5) == 0.0 and way(1, 0.99 * on / SAG_REACH) == 0.0  # too far
+    nodes[3] *= 1.02
+    assert way(3) == 0.0  # off the curve
+
+
+def test_a_node_that_slides_by_less_than_it_may_costs_no_more_for_its_sag() -> None:
+    curves, places = circle()
+    quads, share = np.array([[0, 1, 2, 3]]), np.array([[1.0, 1.0, 1.0, 1.0]])
+    at = np.array([0, 150, 0, len(places) - 150])
+    nodes, arc = places[at].copy(), curves.arc[at].copy()
+    nodes[2] = 0.0
+    held, curve = np.array([ALONG, ALONG, FREE, ALONG]), np.zeros(4, np.int64)
+
+    def around(place: int) -> tuple[float, float]:
+        found: tuple[float, float] = sag_around(
+            nodes, quads, share, np.zeros(1, np.int64), 0, 1, 0, tuple(places[place].tolist()), float(curves.arc[place]),
+            held, curve, arc, curves, np.full(4, 0.4),
+        )  # fmt: skip
+        return found
+
+    cost, spare = around(0)
+    assert cost == 0.0 and spare > 0.0
+    for place in range(0, 3600, 3):
+        if np.linalg.norm(places[place] - places[0]) < 0.4 * spare:
+            assert around(place)[0] == 0.0
+    assert around(90)[0] > 0.0
 
 
 def test_a_trial_tells_how_the_energy_changes() -> None:
