@@ -21,6 +21,7 @@ from scantruss.attempts import FRONT_LENGTHS, MOST_RUNS, SMOOTHED, Attempt, Atte
 from scantruss.check.certify import checked
 from scantruss.errors import CertificateError, FrontError
 from scantruss.improve.optimize import improve_last
+from scantruss.runtime import parallel
 from scantruss.scan.formats.writing import write_points
 
 
@@ -189,7 +190,7 @@ def test_lengths_or_shapes_can_be_preferred(shape: Shape) -> None:
 def test_the_number_of_processors_makes_no_difference(shape: Shape, monkeypatch: pytest.MonkeyPatch) -> None:
     grids = []
     for count in (1, 2, 5):
-        monkeypatch.setattr(candidates, "processors", lambda count=count: count)
+        monkeypatch.setattr(parallel, "processors", lambda count=count: count)
         grids.append(grid_of(shape, "best"))
     for grid in grids[1:]:
         assert grid.nodes.tobytes() == grids[0].nodes.tobytes()
@@ -242,7 +243,7 @@ def test_fronts_that_fail_their_check_are_left_out_and_the_fault_of_the_best_is_
             raise FrontError(f"fault {len(refused)}")
         return grid
 
-    monkeypatch.setattr(candidates, "processors", lambda: 1)
+    monkeypatch.setattr(parallel, "processors", lambda: 1)
     monkeypatch.setattr(candidates, "checked", check)
     grid = st.optimize_fronts(fronts, *steps, settings)
     assert len(refused) == 3 and grid.topology.manifold

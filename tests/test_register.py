@@ -15,8 +15,8 @@ import scantruss as st
 from scantruss.cli.main import main
 from scantruss.cli.splice import splice_parser
 from scantruss.errors import FormatError, InputError
+from scantruss.runtime import parallel
 from scantruss.scan.cloud import PointCloud, measure_spacing
-from scantruss.scan.register import pairs as pair_module
 from scantruss.scan.register import splice_scans
 from scantruss.scan.register.pose_file import pose_values, read_poses
 from scantruss.scan.register.run import Splice
@@ -85,9 +85,9 @@ def test_the_same_to_the_byte_with_one_thread(
     scanned: tuple[list[np.ndarray], list[np.ndarray], Splice], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     scans, _, _result = scanned
-    monkeypatch.setattr(pair_module, "processors", lambda: 1)
+    monkeypatch.setattr(parallel, "processors", lambda: 1)
     again = splice_scans(clouds_of(scans[:2]), NAMES[:2])
-    monkeypatch.setattr(pair_module, "processors", lambda: 3)
+    monkeypatch.setattr(parallel, "processors", lambda: 3)
     once_more = splice_scans(clouds_of(scans[:2]), NAMES[:2])
     assert again.cloud.points.tobytes() == once_more.cloud.points.tobytes()
     assert all(again.poses[name].tobytes() == once_more.poses[name].tobytes() for name in again.poses)
@@ -287,8 +287,8 @@ def test_poses_are_read_back_as_they_were_written(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "text, words",
     [
-        ("", "no JSON file"),
-        ("[" * 100_000, "no JSON file"),
+        ("", "not a JSON file"),
+        ("[" * 100_000, "not a JSON file"),
         ("[]", "holds no poses"),
         ("{}", "holds no poses"),
         ('{"a": 3}', "needs a 4 x 4 matrix"),

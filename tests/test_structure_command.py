@@ -369,7 +369,7 @@ def test_files_of_others_stay(place: Path, capsys: pytest.CaptureFixture[str]) -
     Path("theirs.json").write_text('{"a": 1}')
     for words in ("grid.json theirs.json", "grid.json out.json --report theirs.json"):
         assert run(f"structure {words} --scale 50") == 2
-        assert "is no result that ScanTruss wrote" in capsys.readouterr().err
+        assert "is not a result that ScanTruss wrote" in capsys.readouterr().err
     assert Path("theirs.json").read_text() == '{"a": 1}'
     assert run("structure grid.json theirs.json --scale 50 --force --quiet") == 0
     assert capsys.readouterr().out == ""

@@ -145,7 +145,7 @@ def test_a_pdf_has_pages_and_no_date(place: Path, capsys: pytest.CaptureFixture[
     Path("a.pdf").write_bytes(b"%PDF-1.4\n1 0 obj << /Creator (Somebody) >> endobj\n%%EOF\n")
     capsys.readouterr()
     assert run("a.pdf") == 2
-    assert "is no result that ScanTruss wrote" in capsys.readouterr().err
+    assert "is not a result that ScanTruss wrote" in capsys.readouterr().err
 
 
 def test_lines_of_a_pdf_fit_and_lose_nothing() -> None:

@@ -199,7 +199,7 @@ def choose_by_quality(
     near = near_nodes(surface, front, s, around_segment, length, found)
     alpha, beta = left_angle(front, s), right_angle(front, s)
     segment = norm(subtract(pb, pa))
-    side = rules.length_weight * length + (1.0 - rules.length_weight) * segment
+    side = rules.length_weight * length + (1.0 - rules.length_weight) * segment  # mixed as in Eq. 10
     place = ideal_point(front, s, alpha, beta, side)
     if front.count[LOOK_AT_EDGES] == 1 and front.on_boundary[a] and front.on_boundary[b]:
         place = beside_line(surface, front, s, place, length)

@@ -84,7 +84,7 @@ def _root(path: Path) -> ElementTree.Element:
         target = re.search(r'Target="/?([^"]+\.model)"', relations)
         name = target[1] if target else MODEL_PART
         if name not in names:
-            raise FormatError(f"{path} is a zip archive but not a 3MF file, which holds a 3D model")
+            raise FormatError(f"{path} is not a 3MF file but a zip archive; a 3MF file holds a 3D model")
         check_size(path, package.getinfo(name).file_size)
         text = package.read(name)
         if b"<!DOCTYPE" in text:
