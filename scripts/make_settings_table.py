@@ -12,7 +12,8 @@ PLACE = Path(__file__).resolve().parents[1] / "docs" / "settings.md"
 HEAD = """# Settings
 
 Everything that can be set, in one record: `scantruss.Settings`. Each field is also an option of `scantruss grid`; the other
-numbers of the method are named constants, explained in [choices](choices.md). This page is made from the fields by `scripts/make_settings_table.py`.
+numbers of the method are named constants, explained in [choices](choices.md). This page is made from the fields by
+`scripts/make_settings_table.py`.
 
 | setting | option | symbol | unit | default | choices | what it is | source |
 | --- | --- | --- | --- | --- | --- | --- | --- |
