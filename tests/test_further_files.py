@@ -175,7 +175,10 @@ def test_3mf_and_stl_hold_closed_bodies_where_the_structure_is(name: str, tmp_pa
 
 
 def test_step_bodies_have_the_volumes_of_ours_in_open_cascade(tmp_path: Path) -> None:
-    gmsh = pytest.importorskip("gmsh", exc_type=ImportError)
+    try:
+        gmsh = pytest.importorskip("gmsh", exc_type=ImportError)
+    except OSError as error:  # its wheel needs libraries of the system, such as libGLU
+        pytest.skip(f"gmsh does not start: {error}")
     gmsh.initialize(interruptible=False)
     try:
         gmsh.option.setNumber("General.Terminal", 0)
