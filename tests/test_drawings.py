@@ -143,7 +143,7 @@ MOEBIUS = [(0, 1, 2), (1, 3, 2), (2, 3, 4), (3, 0, 4), (4, 0, 1)]
         ("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 2\n", "meets itself"),
         ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 7\n", "names points that it does not have"),
         ("v 0 0 0\nv 1 0\nf 1 2 3\n", "line 2 is damaged"),
-        ("v 0 0 0\nv 1 0 0\nv 0 nan 0\nf 1 2 3\n", "no number"),
+        ("v 0 0 0\nv 1 0 0\nv 0 nan 0\nf 1 2 3\n", "not a number"),
         ("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 0\nf 1 2 3\nl 1 4\n", "no longer than"),
         ("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 -1 0\nv 0 0 1\nf 1 2 3\nf 1 2 4\nf 1 2 5\n", "no surface"),
         ("v 0 0 0\nv 1 0 0\nv 0 1 0\nv -1 0 0\nv 0 -1 0\nf 1 2 3\nf 1 4 5\n", "no surface"),

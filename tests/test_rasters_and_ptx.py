@@ -66,7 +66,7 @@ def test_columns_of_text_are_still_read(tmp_path: Path) -> None:
         ("ncols 4\nnrows 4\nxllcorner 0\nyllcorner 0\ncellsize 1\n", "12 heights where its head promises 16"),
         ("ncols 4\nnrows 3\nxllcorner 0\ncellsize 1\n", "no yllcorner"),
         ("ncols 4\nnrows 3\nxllcorner 0\nyllcorner 0\n", "no usable"),
-        ("ncols 4\nnrows 3\nxllcorner 0\nyllcorner 0\ncellsize x\n", "no number"),
+        ("ncols 4\nnrows 3\nxllcorner 0\nyllcorner 0\ncellsize x\n", "not a number"),
         ("ncols 4\nnrows 3\nxllcorner 0\nyllcorner 0\ncellsize -1\n", "no usable"),
     ],
 )
