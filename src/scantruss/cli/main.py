@@ -14,7 +14,7 @@ from typing import cast
 
 from .. import __version__
 from ..errors import CertificateError, InputError, ScanTrussError, did_you_mean, words_of_error
-from ..runtime.stopping import SIGNAL_STATUS, asked, note_told, signals_heard, words_of_stop
+from ..runtime.stopping import SIGNAL_STATUS, asked, note_printed, signals_heard, words_of_stop
 
 HELP = f"""\
 scantruss {__version__}: from a 3D scan straight to a grid truss with nearly equal members
@@ -144,6 +144,6 @@ def end(error: BaseException) -> int:
 
 def refuse(message: str, status: int = 2) -> int:
     """Print the reason in one line and return the exit status."""
-    note_told()
+    note_printed()
     print("scantruss:", " ".join(message.split()), file=sys.stderr)
     return status

@@ -30,7 +30,7 @@ class _State:
     """What is known of this process."""
 
     asked: int | None = None  #: the first signal that asked it to end
-    told = False  #: whether the line that says why it ends is printed
+    printed = False  #: whether the line that says why it ends is printed
     written = False  #: results have been put into place
     moving = threading.RLock()  #: held while results are put into place
 
@@ -43,9 +43,9 @@ def asked() -> int | None:
     return _State.asked
 
 
-def note_told() -> None:
+def note_printed() -> None:
     """Note that the one line is out that says why a command ends; the watch writes none then."""
-    _State.told = True
+    _State.printed = True
 
 
 def words_of_stop(number: int) -> str:
@@ -57,7 +57,7 @@ def words_of_stop(number: int) -> str:
 @contextmanager
 def signals_heard() -> Iterator[None]:
     """Raise `Stopped` on the first signal to end, for as long as a command runs; then remove what it left half-written."""
-    _State.asked, _State.told, _State.written = None, False, False
+    _State.asked, _State.printed, _State.written = None, False, False
     with ExitStack() as stack:
         stack.callback(setattr, sys, "unraisablehook", sys.unraisablehook)
         sys.unraisablehook = partial(_say_unless_stopped, sys.unraisablehook)
@@ -155,7 +155,7 @@ def _end_late(ear: socket.socket, mouth: socket.socket) -> None:
         for clean in reversed(_clean_ups.copy()):
             with suppress(Exception):
                 clean()
-        if not _State.told:
+        if not _State.printed:
             os.write(2, f"scantruss: {words_of_stop(number)}\n".encode())
         os._exit(SIGNAL_STATUS[number])
 
