@@ -98,17 +98,17 @@ def test_a_refused_length_comes_with_one_that_passes(
     place: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Where the grid of one length fails, another is named that was tried."""
-    from scantruss.check.certify import checked
+    from scantruss.check.certify import Judged, judge
     from scantruss.scan.member_length import suggest_length
 
     failing = suggest_length(st.read_points("limpet.xyz"))
 
-    def fails_there(grid: st.Grid, samples: SurfaceSamples, boundary: st.Boundary, settings: st.Settings) -> st.Grid:
+    def fails_there(grid: st.Grid, samples: SurfaceSamples, boundary: st.Boundary, settings: st.Settings) -> Judged:
         if abs(settings.length - failing) < 0.01 * failing:
             raise st.FrontError("the front cannot close")
-        return checked(grid, samples, boundary, settings)
+        return judge(grid, samples, boundary, settings)
 
-    monkeypatch.setattr("scantruss.candidates.checked", fails_there)
+    monkeypatch.setattr("scantruss.candidates.judge", fails_there)
     monkeypatch.setattr("scantruss.attempts.MOST_RUNS", 3)  # there is no use in more where all fail
     words = ["grid", "limpet.xyz", "a.json", "--effort", "quick", "--length"]
     assert main([*words, str(failing)]) == 2

@@ -18,7 +18,7 @@ from typed import known
 import scantruss as st
 from scantruss import candidates, pipeline
 from scantruss.attempts import FRONT_LENGTHS, MOST_RUNS, SMOOTHED, Attempt, AttemptLimit, attempts
-from scantruss.check.certify import checked
+from scantruss.check.certify import Judged, judge
 from scantruss.errors import CertificateError, FrontError
 from scantruss.improve.optimize import improve_last
 from scantruss.runtime import parallel
@@ -237,14 +237,14 @@ def test_fronts_that_fail_their_check_are_left_out_and_the_fault_of_the_best_is_
     fronts = st.advance_fronts(*steps, st.orientation_fields(steps.samples, steps.boundary, settings), settings)
     refused: list[st.Grid] = []
 
-    def check(grid: st.Grid, *others: Any) -> st.Grid:
+    def check(grid: st.Grid, *others: Any) -> Judged:
         if others[-1].effort == "best" and len(refused) < 3:
             refused.append(grid)
             raise FrontError(f"fault {len(refused)}")
-        return grid
+        return judge(grid, *others)
 
     monkeypatch.setattr(parallel, "processors", lambda: 1)
-    monkeypatch.setattr(candidates, "checked", check)
+    monkeypatch.setattr(candidates, "judge", check)
     grid = st.optimize_fronts(fronts, *steps, settings)
     assert len(refused) == 3 and grid.topology.manifold
 
@@ -253,7 +253,7 @@ def test_fronts_that_fail_their_check_are_left_out_and_the_fault_of_the_best_is_
         raise FrontError(f"fault {len(refused)}")
 
     refused.clear()
-    monkeypatch.setattr(candidates, "checked", never)
+    monkeypatch.setattr(candidates, "judge", never)
     with pytest.raises(FrontError, match="fault 1"):
         st.optimize_fronts(fronts, *steps, settings)
 
@@ -267,12 +267,12 @@ def test_best_is_no_worse_than_normal_and_takes_part_only_where_that_passes(
     usual = st.grid_from_points(shape.points, settings.replace(effort="normal"))
     fronts = st.advance_fronts(*steps, st.orientation_fields(steps.samples, steps.boundary, settings), settings)
 
-    def check(grid: st.Grid, *others: Any) -> st.Grid:
+    def check(grid: st.Grid, *others: Any) -> Judged:
         if others[-1].effort == fails:
             raise FrontError(f"fault of {fails}")
-        return checked(grid, *others)
+        return judge(grid, *others)
 
-    monkeypatch.setattr(candidates, "checked", check)
+    monkeypatch.setattr(candidates, "judge", check)
     if fails == "normal":
         with pytest.raises(FrontError, match="fault of normal"):
             st.optimize_fronts(fronts, *steps, settings)

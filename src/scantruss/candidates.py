@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from .attempts import VERY_ROUGH_SCAN
-from .check.certify import checked, passed_grid
+from .check.certify import Judged, judge, passed_grid
 from .errors import FrontError, Place
 from .front.advance import advance_front
 from .front.orientation_field import Field, orientation_fields
@@ -46,7 +46,8 @@ class Candidate:
     front: Grid
     settings: Settings  #: how it is improved
     mesh: WorkingMesh
-    grid: Grid | None = None  #: improved to the end, with its certificate
+    judged: Judged | None = None  #: its grid, improved to the end, with what is wrong with it
+    grid: Grid | None = None  #: that grid with its certificate
     fault: FrontError | None = None  #: why it is not to be used
 
     @property
@@ -70,6 +71,15 @@ class Candidate:
             return self.energy
         distance = getattr(found.scan_distance, quantile) / self.settings.length
         return self.energy + MISSING_ENERGY * found.missing + distance_energy * float(distance)
+
+    def take(self, judged: Judged) -> None:
+        """Take a grid that was judged."""
+        self.judged, self.grid = judged, judged.checked_grid
+
+    def end(self) -> None:
+        """Make the whole certificate of the grid taken, and refuse it if it does not pass."""
+        assert self.judged is not None
+        self.grid = passed_grid(self.judged.grid.replace(certificate=self.judged.whole_certificate()))
 
     @property
     def is_poor(self) -> bool:
@@ -192,10 +202,10 @@ def those_that_pass(
         try:
             grid = improve_last(candidate.mesh, candidate.front, samples, constraints, candidate.settings)
             grid = finish_rings(grid, boundary)
-            candidate.grid = checked(grid.replace(settings=settings), samples, boundary, settings)
-            if samples.rough <= VERY_ROUGH_SCAN and misses_at_most(candidate.grid, MOST_MISSED):
+            candidate.take(judge(grid.replace(settings=settings), samples, boundary, settings))
+            if samples.rough <= VERY_ROUGH_SCAN and misses_at_most(grid_of(candidate), MOST_MISSED):
                 reach_tips_of(candidate, samples, boundary, constraints, settings)
-            candidate.grid = passed_grid(candidate.grid)
+            candidate.end()
         except FrontError as error:
             candidate.grid, candidate.fault = None, error
 
@@ -232,13 +242,14 @@ def reach_tips_of(
 
     def try_to_take(grid: Grid, cost: float) -> list[Place] | None:
         """Take the grid that the mesh has become where it is better than that of a cost; else return the places of its faults."""
-        before = candidate.grid
-        candidate.grid = checked(finish_rings(grid, boundary).replace(settings=settings), samples, boundary, settings)
-        if misses_at_most(candidate.grid, MOST_MISSED) and candidate.cost_of_tips < cost:
+        before = candidate.judged
+        assert before is not None
+        now = judge(finish_rings(grid, boundary).replace(settings=settings), samples, boundary, settings)
+        candidate.take(now)
+        if misses_at_most(grid_of(candidate), MOST_MISSED) and candidate.cost_of_tips < cost:
             return None
-        found = candidate.grid.certificate
-        candidate.grid = before
-        faults = found.faults if found else ()
+        candidate.take(before)
+        faults = now.certificate.faults
         return [fault.where for fault in faults if fault.where and fault.kind != "cover"]
 
     given_up: list[Place] = []
@@ -310,10 +321,12 @@ def search_on(
     usual = grid_of(candidate)
     for _ in range(TURNS_OF_SEARCH):
         grid = searched_again(candidate.mesh, candidate.front, samples, constraints, candidate.settings)
-        grid = checked(finish_rings(grid, boundary).replace(settings=settings), samples, boundary, settings)
-        passes = grid.certificate is not None and grid.certificate.passed and _is_no_worse(grid, usual)
+        judged = judge(finish_rings(grid, boundary).replace(settings=settings), samples, boundary, settings)
+        grid = judged.checked_grid
+        passes = judged.certificate.passed and _is_no_worse(grid, usual)
         if passes and grid.quality.length_cv < grid_of(candidate).quality.length_cv:
-            candidate.grid = grid
+            candidate.take(judged)
+    candidate.end()
 
 
 def _is_no_worse(grid: Grid, other: Grid) -> bool:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..constraints.network import curves_of
 from ..grid.certificate import Fault
-from ..kernels.boundary.curves import Curves, nearest_on_curves
+from ..kernels.boundary.curves import Curves, distances_from_curves
 from .limits import HEXAGON_BOUNDARY, Figure
 
 if TYPE_CHECKING:
@@ -62,7 +62,9 @@ def places_aside(grid: Grid, boundary: Boundary, length: float) -> list[Fault]:
 
 def _distances(curves: Curves, places: np.ndarray) -> np.ndarray:
     """Return the distance of each place (K, 3) from the nearest curve (K,)."""
-    return np.array([nearest_on_curves(curves, *place)[2] for place in places.tolist()])
+    distance = np.empty(len(places))
+    distances_from_curves(curves, places, distance)
+    return distance
 
 
 def _figure(

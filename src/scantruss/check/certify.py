@@ -6,24 +6,24 @@ A grid that does not pass is refused by `pipeline`: rather no result than a wron
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import CertificateError
-from ..grid.certificate import Certificate, Fault, LeftOut, Spread, Worst, place_of
+from ..grid.certificate import Certificate, Fault, Spread, Worst, place_of
 from ..runtime.parallel import side_by_side
 from ..surface.chosen_samples import KEPT, LIMB, SLIT
 from .boundaries import places_aside
 from .crossings import find_crossings
 from .defects import faults_in_space, faults_of_topology
-from .distances import Distances, measure_distances
+from .distances import Distances, measure_distances, offsets_from_points
 from .doubtful import doubtful_places
 from .folds import fold_angles
 from .gaps import bridged_gaps
 from .irregular import count_irregular
-from .left_out import parts_left_out
+from .left_out import closed_holes, first_and_more, parts_left_out
 from .limits import ROUNDED_BY, limits_of, places_to_look_at, widened_limits
 from .sheets import cut_apart, faults_on_sheets, nodes_of_samples
 from .unfollowed import unfollowed_parts
@@ -61,35 +61,74 @@ def certify(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings: S
     Certificate
         Nothing is raised where it does not pass; see `Certificate.faults`.
     """
+    return judge(grid, samples, boundary, settings).whole_certificate()
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """A grid that was measured, with all that is wrong with it, as far as a search needs it."""
+
+    grid: Grid
+    samples: SurfaceSamples
+    boundary: Boundary
+    settings: Settings
+    certificate: Certificate  #: without other warnings than those of its limits, closed holes, bridged gaps, and offsets of its nodes
+    found: Distances | None  #: None for a grid without triangles
+
+    @property
+    def checked_grid(self) -> Grid:
+        """The grid with the certificate as far as it goes."""
+        return self.grid.replace(certificate=self.certificate)
+
+    def whole_certificate(self) -> Certificate:
+        """Return the certificate with all that it says."""
+        found, length = self.found, self.settings.length
+        if found is None:
+            return self.certificate
+        grid, samples, boundary, settings = self.grid, self.samples, self.boundary, self.settings
+        members = _desired_at_points(grid, found, length)
+        followed = (samples.judged == KEPT) & ~samples.elsewhere
+        missed_at = place_of(samples.scan[_missed(found, followed, members)] + samples.origin)
+        rough = samples.moved  # then its roughness is the scatter
+        rounded = 0.0 if rough else _rounded(found, followed, members)
+        offsets, (gaps, bridged), doubtful, aside, beside, apart = side_by_side(
+            lambda: _offsets(grid, samples, length),
+            lambda: bridged_gaps(grid, samples, boundary, length),
+            lambda: [] if settings.boundary else doubtful_places(grid, samples, length),
+            lambda: places_aside(grid, boundary, length),
+            lambda: [] if rough else unfollowed_parts(grid, samples, found, followed, members),
+            lambda: cut_apart(grid, samples, found, length),
+        )
+        places = places_to_look_at(self.certificate, missed_at, rounded)
+        return replace(
+            self.certificate,
+            left_out=(*self.certificate.left_out, *closed_holes(samples, boundary), *first_and_more(gaps)),
+            warnings=(*self.certificate.warnings, *apart, *bridged, *doubtful, *aside, *beside, *places),
+            **offsets,
+        )
+
+
+def judge(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings: Settings) -> Judged:
+    """Return a grid with what is wrong with it; parameters as of `certify`."""
     empty = "has no triangles" if len(grid.triangles) == 0 else ""
     if empty or not np.isfinite(grid.nodes).all():
         fault = Fault("empty", empty or "has nodes that are nowhere")
-        return replace(_topology(grid, samples, boundary, settings), faults=(fault,))
+        bare = replace(_topology(grid, samples, boundary, settings), faults=(fault,))
+        return Judged(grid, samples, boundary, settings, bare, None)
     length = settings.length
     found = measure_distances(grid, samples, length)
-    nearest, cuts, certificate, (gaps, bridged), doubtful, aside = side_by_side(
+    nearest, cuts, certificate = side_by_side(
         lambda: nodes_of_samples(grid, samples, length),
         lambda: find_crossings(grid.nodes, grid.triangles, grid.origin),
         lambda: replace(_topology(grid, samples, boundary, settings), **_extremes(grid, settings)),
-        lambda: bridged_gaps(grid, samples, boundary, length),
-        lambda: [] if settings.boundary else doubtful_places(grid, samples, length),
-        lambda: places_aside(grid, boundary, length),
     )
-    certificate = replace(certificate, crossings=len(cuts), **_apart(grid, samples, boundary, gaps, found, length))
+    certificate = replace(certificate, crossings=len(cuts), **_apart(grid, samples, found, length))
     faults = [*faults_of_topology(grid, certificate, boundary), *faults_in_space(grid, certificate, cuts, settings)]
     too_far, poor = limits_of(grid, found, settings)
     known = {fault.kind for fault in faults}
     faults += [fault for fault in (*too_far, *faults_on_sheets(grid, samples, nearest)) if fault.kind not in known]
-    members = _desired_at_points(grid, found, length)
-    followed = (samples.judged == KEPT) & ~samples.elsewhere
-    missed_at = place_of(samples.scan[_missed(found, followed, members)] + samples.origin)
-    rough = samples.moved  # then its roughness is the scatter
-    rounded = 0.0 if rough else _rounded(found, followed, members)
-    beside = [] if rough else unfollowed_parts(grid, samples, found, followed, members)
-    apart = cut_apart(grid, samples, found, length)
-    places = places_to_look_at(certificate, missed_at, rounded)
-    warnings = (*poor, *apart, *bridged, *doubtful, *aside, *beside, *places)
-    return replace(certificate, faults=tuple(faults), warnings=warnings, widened=widened_limits(settings))
+    certificate = replace(certificate, faults=tuple(faults), warnings=tuple(poor), widened=widened_limits(settings))
+    return Judged(grid, samples, boundary, settings, certificate, found)
 
 
 def checked(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings: Settings) -> Grid:
@@ -153,9 +192,7 @@ def _topology(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings:
     )
 
 
-def _apart(
-    grid: Grid, samples: SurfaceSamples, boundary: Boundary, gaps: list[LeftOut], found: Distances, length: float
-) -> dict[str, Any]:
+def _apart(grid: Grid, samples: SurfaceSamples, found: Distances, length: float) -> dict[str, Any]:
     """Return how far the scan lies from the grid and the grid from the scan, and what is left out."""
     at_nodes = _desired(grid, length)
     at_triangles = at_nodes[grid.triangles].mean(axis=1)
@@ -164,7 +201,7 @@ def _apart(
     in_reach = known <= COVER_REACH * at_triangles[np.isfinite(found.triangles)]
     wanted = np.isin(samples.judged, (KEPT, LIMB, SLIT)) & ~samples.elsewhere
     beyond = wanted & (found.scan > COVER_REACH * members)
-    left_out = parts_left_out(samples, boundary, gaps, found, members, COVER_REACH * members)
+    left_out = parts_left_out(samples, found, members, COVER_REACH * members)
     return {
         "points": len(samples.scan),
         "left_out": left_out,
@@ -177,20 +214,20 @@ def _apart(
         ),
         "node_distance": _spread(found.nodes, grid.nodes, grid, length / at_nodes),
         "noise": float(np.median(found.noise)),
-        **_offsets(found),
     }
 
 
-def _offsets(found: Distances) -> dict[str, float]:
+def _offsets(grid: Grid, samples: SurfaceSamples, length: float) -> dict[str, float]:
     """Return the bias of the nodes and the scatter of the points about them; nothing where there are no points around any."""
-    known = np.isfinite(found.bias)
+    bias, scatter = offsets_from_points(grid, samples, length)
+    known = np.isfinite(bias)
     if not known.any():
         return {}
-    bias = found.bias[known]
+    bias = bias[known]
     return {
         "node_bias": float(bias.mean()),
         "node_bias_p95": float(np.quantile(np.abs(bias), 0.95)),
-        "node_scatter": float(np.median(found.scatter[known])),
+        "node_scatter": float(np.median(scatter[known])),
     }
 
 

@@ -13,6 +13,7 @@ from ..kernels.mesh.coverage import nearest_distances, put_places
 from ..kernels.mesh.distances import nearest_triangles, plane_distances, triangle_boxes
 from ..kernels.surface.mean_surface import mean_offsets
 from ..runtime.parallel import in_parts, side_by_side
+from ..scan.cloud import bounds_of
 
 if TYPE_CHECKING:
     from ..grid.grid import Grid
@@ -39,8 +40,6 @@ class Distances:
     )  #: (T,) of the middle or a corner of each triangle, the farther, from the nearest point; NaN over closed holes
     nodes: np.ndarray  #: (V,) of each node from the plane of the points around it; NaN over closed holes
     noise: np.ndarray  #: (V,) rms distance of those points from their plane
-    bias: np.ndarray  #: (V,) of each node from the surface of the points within a member, positive if that lies outside
-    scatter: np.ndarray  #: (V,) rms distance of those points from that surface
 
 
 def measure_distances(grid: Grid, samples: SurfaceSamples, length: float) -> Distances:
@@ -50,12 +49,10 @@ def measure_distances(grid: Grid, samples: SurfaceSamples, length: float) -> Dis
     ----------
     length : desired member length [scan unit]
     """
-    (scan, triangle), (triangles, nodes, noise), (bias, scatter) = side_by_side(
-        lambda: distances_to_grid(samples.scan, grid, length),
-        lambda: distances_to_points(grid, samples, length),
-        lambda: offsets_from_points(grid, samples, length),
+    (scan, triangle), (triangles, nodes, noise) = side_by_side(
+        lambda: distances_to_grid(samples.scan, grid, length), lambda: distances_to_points(grid, samples, length)
     )
-    return Distances(scan, triangle, triangles, nodes, noise, bias, scatter)
+    return Distances(scan, triangle, triangles, nodes, noise)
 
 
 def distances_to_grid(points: np.ndarray, grid: Grid, length: float) -> tuple[np.ndarray, np.ndarray]:
@@ -84,8 +81,8 @@ def distances_to_points(
     boxes = boxes_of(points, max(POINT_BOX * length, 2.0 * samples.spacing))
     middles = grid.nodes[grid.triangles].mean(axis=1)
     to_middles, to_corners = np.empty(len(middles)), np.empty(len(grid.nodes))
-    nearest_distances(middles, points, boxes, 0.25 * length, to_middles)
-    nearest_distances(grid.nodes, points, boxes, 0.25 * length, to_corners)
+    nearest_distances(middles, points, boxes, 2.0 * samples.spacing, to_middles)
+    nearest_distances(grid.nodes, points, boxes, 2.0 * samples.spacing, to_corners)
     if samples.moved:  # nodes lie on the mean surface
         boxes = boxes_of(samples.surface.points, POINT_BOX * length)
     to_nodes, noise = distances_to_planes(grid.nodes, samples, boxes)
@@ -117,7 +114,7 @@ def points_of_planes(samples: SurfaceSamples) -> np.ndarray:
 
 
 def offsets_from_points(grid: Grid, samples: SurfaceSamples, length: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return how far outside of each node the surface of the points around it lies, and how they scatter about that (V,).
+    """Return how far outside of each node the surface of the points within a member lies, and their rms distance from that (V,).
 
     Measured points, never those of the mean surface; NaN over closed holes.
     """
@@ -143,7 +140,7 @@ def _node_normals(grid: Grid) -> np.ndarray:
 
 def boxes_of(points: np.ndarray, box: float) -> SearchBoxes:
     """Return points (N, 3) by box, the boxes no larger than `box` [scan unit]."""
-    boxes = new_boxes(points.min(axis=0), points.max(axis=0), box, len(points), len(points))
+    boxes = new_boxes(*bounds_of(points), box, len(points), len(points))
     put_places(boxes, points)
     return boxes
 

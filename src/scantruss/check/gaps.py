@@ -52,21 +52,22 @@ def bridged_gaps(
     boxes = boxes_of(points, max(POINT_BOX * length, 2.0 * samples.spacing))
     places, owner = _places(grid)
     away = np.empty(len(places))
-    nearest_distances(places, points, boxes, 0.25 * length, away)
+    nearest_distances(places, points, boxes, 2.0 * samples.spacing, away)
     members = np.full(len(grid.nodes), length) if grid.desired is None else grid.desired
     least = HALF_WIDTH * members[grid.triangles].mean(axis=1)[owner]
-    far = np.flatnonzero(away > least)
-    far = far[np.argsort(-away[far], kind="stable")[:GAPS_LOOKED_AT]]
-    if not len(far):
+    if not (away > least).any():
         return [], []
-    points = by_x(points)
-    triangle = owner[far]
-    normals = _normals(grid)
+    points, normals = by_x(points), _normals(grid)
     some = np.arange(0, len(places), len(places) // SOME_PLACES + 1)
     usual = np.median([_level(places[at], normals[owner[at]], away[at], points).min(initial=away[at]) for at in some])
+    least = np.maximum(least, UNEVEN * usual)
+    far = np.flatnonzero(away > least)
+    far = far[np.argsort(-away[far], kind="stable")[:GAPS_LOOKED_AT]]
     half = np.array([empty_disc(places[at], normals[owner[at]], away[at], points) for at in far])
-    empty = half > np.maximum(least[far], UNEVEN * usual)
-    far, triangle, half = far[empty], triangle[empty], half[empty]
+    far, half = far[half > least[far]], half[half > least[far]]
+    if not len(far):
+        return [], []
+    triangle = owner[far]
     group = _groups(grid, triangle)[triangle]
     is_open = _open_triangles(grid, samples.measured_points, boxes, length)
     found: list[tuple[float, LeftOut, bool]] = []

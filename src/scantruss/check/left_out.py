@@ -25,14 +25,9 @@ PLACES_LISTED = 5  # places of a kind that are listed one by one; the others are
 
 
 def parts_left_out(
-    samples: SurfaceSamples,
-    boundary: Boundary,
-    gaps: list[LeftOut],
-    found: Distances,
-    members: np.ndarray,
-    reach: np.ndarray,
+    samples: SurfaceSamples, found: Distances, members: np.ndarray, reach: np.ndarray
 ) -> tuple[LeftOut, ...]:
-    """Return what a grid leaves out, the most points first; what the settings asked for, closed holes and bridged gaps come last.
+    """Return what a grid leaves out, the most points first, what the settings asked for last.
 
     Parameters
     ----------
@@ -42,8 +37,6 @@ def parts_left_out(
     return (
         *(part for part, _ in points_left_out(samples, found.scan, members, reach)),
         *(LeftOut(words, number, number / total, asked=True) for words, number in samples.unread),
-        *_first_and_more(_closed_holes(samples, boundary)),
-        *_first_and_more(gaps),
     )
 
 
@@ -124,16 +117,18 @@ def _places(
 def points_together(points: np.ndarray, apart: np.ndarray) -> np.ndarray:
     """Return a number for each of some points (K, 3): the same where gaps between them are small (K,)."""
     cell = float(apart.max())
-    cells, number = np.unique(np.floor(points / cell).astype(np.int64), axis=0, return_inverse=True)
-    there = {tuple(each): k for k, each in enumerate(cells.tolist())}
+    places = np.floor(points / cell).astype(np.int64)
+    places -= places.min(axis=0) - 1
+    across = places.max(axis=0) + 2  # a layer of empty cells around
+    cells, number = np.unique((places[:, 0] * across[1] + places[:, 1]) * across[2] + places[:, 2], return_inverse=True)
     steps = [(i, j, k) for i in (-1, 0, 1) for j in (-1, 0, 1) for k in (-1, 0, 1) if (i, j, k) > (0, 0, 0)]
-    pairs = [
-        (number, there[beside])
-        for each, number in there.items()
-        for step in steps
-        if (beside := tuple(int(a + b) for a, b in zip(each, step, strict=True))) in there
-    ]
-    one, other = np.array(pairs, np.int64).reshape(-1, 2).T
+    pairs = []
+    for i, j, k in steps:
+        beside = cells + (i * across[1] + j) * across[2] + k
+        at = np.searchsorted(cells, beside).clip(max=len(cells) - 1)
+        there = np.flatnonzero(cells[at] == beside)
+        pairs.append(np.stack([there, at[there]]))
+    one, other = np.concatenate(pairs, axis=1)
     label: np.ndarray = component_labels(len(cells), one, other)[number.ravel()]
     return label
 
@@ -151,10 +146,11 @@ def _groups(samples: SurfaceSamples, owner: np.ndarray) -> np.ndarray:
     return np.where(owner >= 0, label[position[owner]] if len(chosen) else -1, -1)
 
 
-def _closed_holes(samples: SurfaceSamples, boundary: Boundary) -> list[LeftOut]:
-    """Return the holes that were closed, the largest first: filled with made-up points, or so small that the front ran over them.
+def closed_holes(samples: SurfaceSamples, boundary: Boundary) -> list[LeftOut]:
+    """Return the holes that were closed, the largest first and further ones as one.
 
-    Of the latter, places between sparse points are left out that are empty by accident.
+    They were filled with made-up points, or were so small that the front ran over them. Of the latter, places between sparse points
+    are left out that are empty by accident.
     """
     made_up = np.arange(samples.measured, len(samples.surface.mean))
     group = _groups(samples, made_up)
@@ -163,7 +159,7 @@ def _closed_holes(samples: SurfaceSamples, boundary: Boundary) -> list[LeftOut]:
     holes = [_hole(places, samples, asked=True) for places in filled]
     points = by_x(samples.measured_points) if boundary.bridged else samples.measured_points
     holes += [_hole(curve, samples, asked=False) for curve in boundary.bridged if is_empty_within(curve, points)]
-    return sorted(holes, key=lambda hole: -(hole.size or 0.0))
+    return first_and_more(sorted(holes, key=lambda hole: -(hole.size or 0.0)))
 
 
 def _closes_body(places: np.ndarray, samples: SurfaceSamples) -> bool:
@@ -174,7 +170,7 @@ def _closes_body(places: np.ndarray, samples: SurfaceSamples) -> bool:
     return bool(near.any())
 
 
-def _first_and_more(parts: list[LeftOut]) -> list[LeftOut]:
+def first_and_more(parts: list[LeftOut]) -> list[LeftOut]:
     """Return the first of some entries of one kind, and one for the others."""
     if len(more := parts[PLACES_LISTED:]) < 2:
         return parts

@@ -153,7 +153,9 @@ def take_place(
 
 def nodes_around(net: Net, v: int, rings: int) -> np.ndarray:
     """Return the nodes within some members of a node, (K,) int64."""
-    near = {v}
+    near = np.array([v])
     for _ in range(rings):
-        near |= {u for w in near for u in net.ring[w, : net.degree[w]].tolist()}
-    return np.array(sorted(near))
+        around = net.ring[near]
+        there = np.arange(around.shape[1]) < net.degree[near, None]
+        near = np.unique(np.concatenate([near, around[there]]))
+    return near

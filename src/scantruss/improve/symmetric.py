@@ -11,7 +11,7 @@ import numpy as np
 
 from ..constraints.network import curves_of
 from ..errors import FrontError, InputError
-from ..kernels.boundary.curves import nearest_on_curves
+from ..kernels.boundary.curves import distances_from_curves
 from ..scan.rotation import Rotation, check_rotation, find_rotation
 from ..scan.symmetry import SYMMETRY_TOLERANCE, MirrorPlane, check_mirror_planes, find_mirror_planes
 from ..settings.values import ROTATION_NUMBERS
@@ -40,7 +40,8 @@ def check_boundary_kept(made: Grid, boundary: Boundary, length: float) -> None:
     loops = [loop for loop in boundary.loops if loop.cut != "close"]
     curves = curves_of([made.nodes[np.array(own)] for own in made.boundary_loops], [True] * len(made.boundary_loops))
     places = np.concatenate([np.zeros((0, 3)), *(loop.points for loop in loops)])
-    away = np.array([nearest_on_curves(curves, *place)[2] for place in places.tolist()])
+    away = np.empty(len(places))
+    distances_from_curves(curves, places, away)
     if len(away) and away.max() > ON_BOUNDARY * length:
         x, y, z = (places[away.argmax()] + made.origin).tolist()
         raise FrontError(

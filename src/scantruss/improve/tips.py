@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..check.distances import distances_to_grid
 from ..kernels.boundary.curves import nearest_on_curves
-from ..kernels.mesh.distances import nearest_triangles, triangle_boxes
 from ..kernels.mesh.trial import Scratch
 from .equalize import energy_of_grid, new_scratch
 from .fixed_nodes import take_place, ways_to_place
@@ -61,10 +61,7 @@ def find_tips(
     places = samples.surface.mean[measured]
     local = mesh.length * samples.surface.field[measured]
     grid = close_net(mesh.net, mesh.source, front)
-    away, nearest = np.empty(len(places)), np.empty(len(places), np.int64)
-    index = triangle_boxes(grid.nodes, grid.triangles, mesh.length, FARTHEST_TIP * float(local.max(initial=0.0)))
-    nearest_triangles(places, index, grid.nodes, grid.triangles, np.arange(len(places)), away, nearest, 0, len(places))
-    off = away / local
+    off = distances_to_grid(places, grid, mesh.length)[0] / local
     order = np.argsort(-off, kind="stable")
     order = order[(off[order] >= LEAST_TIP) & (off[order] <= FARTHEST_TIP)]
     given_up = [(np.array(fault) - samples.origin, times) for fault, times in Counter(faults).items()]
@@ -91,8 +88,9 @@ def _reach(mesh: WorkingMesh, scratch: Scratch, place: np.ndarray) -> bool:
     for way in ways_to_place(mesh, place):
         mesh.restore(start)
         take_place(mesh, scratch, way, place, around=True)
-        if energy_of_grid(mesh, scratch) < least:
-            best, least = mesh.copied(), energy_of_grid(mesh, scratch)
+        energy = energy_of_grid(mesh, scratch)
+        if energy < least:
+            best, least = mesh.copied(), energy
     mesh.restore(start if best is None else best)
     mesh.fixed[:] = start.fixed
     return best is not None

@@ -56,9 +56,12 @@ def usual_extent(points: np.ndarray) -> np.ndarray:
     """
     some = points[:: max(len(points) // POINTS_OF_BULK, 1)]
     lower, upper = bulk_of(some[:: max(len(some) // POINTS_OF_EXTENT, 1)])
-    away = np.linalg.norm(some - 0.5 * (lower + upper), axis=1)
-    near = some[away <= FARTHEST_FROM_BULK * np.linalg.norm(upper - lower)]
-    return np.stack([near.min(axis=0), near.max(axis=0)])
+    middle, reach = 0.5 * (lower + upper), FARTHEST_FROM_BULK * np.linalg.norm(upper - lower)
+    lowest, highest = (np.array([measure(axis) for axis in some.T]) for measure in (np.min, np.max))
+    if np.linalg.norm(np.maximum(highest - middle, middle - lowest)) > reach:
+        near = some[np.linalg.norm(some - middle, axis=1) <= reach]
+        lowest, highest = near.min(axis=0), near.max(axis=0)
+    return np.stack([lowest, highest])
 
 
 def joint_extent(one: np.ndarray, other: np.ndarray) -> np.ndarray:
@@ -183,8 +186,10 @@ def find_no_data(points: np.ndarray) -> tuple[np.ndarray, float] | None:
 
     Then many points share exactly the least or the greatest height, and a cliff divides them from their neighbours; a lake has a shore.
     """
-    z = points[:, 2]
-    if len(points) < FEWEST_POINTS or len(np.unique(points[:, 0])) > RASTER_COLUMNS * math.sqrt(len(points)):
+    x, z = points[:, 0], points[:, 2]
+    most = RASTER_COLUMNS * math.sqrt(len(points))
+    some = x[:: int(len(x) / (2.0 * most + 1.0)) + 1]  # of these as many are different at most
+    if len(points) < FEWEST_POINTS or len(np.unique(some)) > most or len(np.unique(x)) > most:
         return None
     for value in (z.min(), z.max()):
         at: np.ndarray = z == value
@@ -243,10 +248,13 @@ def single_precision_note(cloud: PointCloud) -> tuple[str, ...]:
     some = cloud.points[:: max(len(cloud.points) // POINTS_OF_EXTENT, 1)] + cloud.origin
     with np.errstate(over="ignore"):
         rounded = some.astype(np.float32)
+    single = (rounded == some).all(axis=0)
+    if not single.any():
+        return ()
     step = np.spacing(np.median(np.abs(rounded), axis=0)).astype(np.float64)
     sides = np.sort(np.ptp(usual_extent(cloud.points), axis=0))
     apart = math.sqrt(float(sides[1] * sides[2]) / len(cloud.points))
-    coarse = np.flatnonzero((rounded == some).all(axis=0) & (step > SINGLE_STEP * apart))
+    coarse = np.flatnonzero(single & (step > SINGLE_STEP * apart))
     if not len(coarse):
         return ()
     names, unit = " and ".join("xyz"[axis] for axis in coarse), f" {cloud.unit}" if cloud.unit else ""

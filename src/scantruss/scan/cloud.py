@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from importlib import import_module
@@ -38,6 +39,7 @@ MOST_COPIES = 5  # times that a scan may be stored with every point repeated
 POINTS_FOR_SPACING = 600  # points at which the spacing is measured
 POINTS_FOR_FIRST_SPACING = 60  # points among them for a first estimate
 POINTS_FOR_GAP = 200  # points at which the gap is measured
+POINTS_FOR_SHARE = 60  # points at which a quick look tells how many have others near
 COORDINATES_PER_THREAD = 50_000  # fewest points that are worth a thread
 
 
@@ -302,15 +304,30 @@ def measure_gap(points: np.ndarray) -> float:
     """
     most = min(6 * MOST_COPIES, len(points) - 1)
     gaps = []
-    for place in points[np.linspace(0, len(points) - 1, min(len(points), POINTS_FOR_GAP)).astype(np.int64)]:
-        squared = np.zeros(len(points))
-        for axis in range(3):
-            squared += (points[:, axis] - place[axis]) ** 2
+    for squared in _squared_distances(points, POINTS_FOR_GAP):
         near = np.argpartition(squared, most)[: most + 1]
         _, places = np.unique(points[near], axis=0, return_index=True)
         apart = np.sort(squared[near[places]])
         gaps.append(apart[min(6, len(apart) - 1)])
     return float(np.sqrt(np.median(gaps)))
+
+
+def share_with_six_near(points: np.ndarray, reach: float) -> float:
+    """Return the share of points (N, 3), by some of them, with six others within reach, coincident ones counted once."""
+    crowded = 0
+    for squared in _squared_distances(points, POINTS_FOR_SHARE):
+        near = np.flatnonzero(squared <= reach * reach)[: 6 * MOST_COPIES + 1]
+        crowded += len(near) > 6 and len(set(map(tuple, points[near].tolist()))) > 6
+    return crowded / min(len(points), POINTS_FOR_SHARE)
+
+
+def _squared_distances(points: np.ndarray, count: int) -> Iterator[np.ndarray]:
+    """Yield the squared distances (N,) of all points (N, 3) from each of some of them."""
+    for place in points[np.linspace(0, len(points) - 1, min(len(points), count)).astype(np.int64)]:
+        squared = np.zeros(len(points))
+        for axis in range(3):
+            squared += (points[:, axis] - place[axis]) ** 2
+        yield squared
 
 
 def _nearest_of(rows: np.ndarray, others: np.ndarray, same: float) -> np.ndarray:

@@ -5,9 +5,11 @@ from __future__ import annotations
 import math
 from typing import Literal
 
+import numpy as np
+
 from ..errors import InputError, LengthError, words_of_number
 from ..settings import Settings, shortest_and_longest
-from .cloud import PointCloud, measure_gap
+from .cloud import PointCloud, share_with_six_near
 
 LEAST_SPACINGS = 3.0  #: a member needs this many point spacings, or a boundary cannot be distinguished from a gap
 # a member needs this many distances to the sixth neighbour, which for random points is more than the spacings
@@ -27,6 +29,7 @@ MESH_FILES = (
 )  #: files of meshes, of which the vertices are read
 SOME_POINTS = 8_000  #: points of a first look at how far apart they lie
 SURELY_FEWER = 4  #: times as many in a scan: then they lie closer than in that look
+SURE_SHARE = 0.75  #: share of the places at which they must lie near enough in that look; half of them would do
 
 
 def check_length(cloud: PointCloud, settings: Settings) -> None:
@@ -83,14 +86,13 @@ def length_range(cloud: PointCloud) -> tuple[float, float]:
 
 def _surely_carries(cloud: PointCloud, shortest: float, longest: float) -> bool:
     """Whether members of such lengths are possible by a quick look: if some of the points lie near enough for them, all do."""
-    every = len(cloud.points) // SOME_POINTS
-    if (
-        every < SURELY_FEWER
-        or longest * LARGEST_PER_EXTENT > cloud.usual_extent
-        or shortest < LEAST_SPACINGS * cloud.spacing
-    ):
+    if longest * LARGEST_PER_EXTENT > cloud.usual_extent or shortest < LEAST_SPACINGS * cloud.spacing:
         return False
-    return RANDOM_GAPS * measure_gap(cloud.points[::every]) <= shortest
+    every = len(cloud.points) // SOME_POINTS
+    return any(
+        share_with_six_near(np.asfortranarray(cloud.points[::step]), shortest / RANDOM_GAPS) >= SURE_SHARE
+        for step in ((every, 1) if every >= SURELY_FEWER else (1,))
+    )
 
 
 def suggest_length(cloud: PointCloud) -> float:

@@ -76,12 +76,16 @@ def check_is_surface(samples: SurfaceSamples) -> None:
 
 def _spread(points: np.ndarray) -> np.ndarray:
     """Return the three principal variances of points (N, 3), least first; zeros for fewer than five points."""
-    return np.linalg.eigvalsh(np.cov(points.T)) if len(points) >= 5 else np.zeros(3)
+    if len(points) < 5:
+        return np.zeros(3)
+    off = points - points.mean(axis=0)
+    return np.linalg.eigvalsh(off.T @ off / (len(off) - 1))
 
 
 def _within(places: np.ndarray, place: np.ndarray, radius: float) -> np.ndarray:
     """Return those of some places (N, 3) within a radius of one."""
-    return places[((places - place) ** 2).sum(axis=1) <= radius**2]
+    squares = sum((column - at) ** 2 for column, at in zip(places.T, place, strict=True))
+    return places[squares <= radius**2]
 
 
 def _nearest_points(surface: Surface, place: np.ndarray) -> np.ndarray:

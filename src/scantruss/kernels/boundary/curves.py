@@ -134,3 +134,10 @@ def nearest_on_curves(curves: Curves, x: float, y: float, z: float) -> tuple[int
             while i + 1 < last and curves.arc[i + 1] < spare:  # and so does each of these
                 i += 1
     return curve, arc, np.sqrt(best)
+
+
+@kernel
+def distances_from_curves(curves: Curves, places: np.ndarray, distance: np.ndarray) -> None:
+    """Fill in the distance (K,) of each place (K, 3) from the nearest curve."""
+    for k in range(len(places)):
+        distance[k] = nearest_on_curves(curves, places[k, 0], places[k, 1], places[k, 2])[2]

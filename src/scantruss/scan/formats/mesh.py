@@ -44,9 +44,8 @@ def read_obj(path: Path, wanted: Sequence[str] = ()) -> Content:
 def _obj_faces(lines: list[str], points: int) -> list[np.ndarray]:
     """Return the faces of `f` lines, those of as many corners together; none where one is damaged."""
     by_corners = dict[int, list[str]]()
-    for line in lines:
-        words = line.split()[1:]
-        by_corners.setdefault(len(words), []).append(" ".join(word.partition("/")[0] for word in words))
+    for line in re.sub(r"/\S*", "", "".join(lines)).splitlines():  # the numbers of textures and normals
+        by_corners.setdefault(len(line.split()) - 1, []).append(line.lstrip()[1:])
     try:
         faces = [np.loadtxt(rows, np.int64, ndmin=2) for corners, rows in by_corners.items() if corners > 2]
     except ValueError:
