@@ -121,6 +121,24 @@ def test_members_name_their_family(tmp_path: Path) -> None:
     assert off.max() == pytest.approx(1000 * np.abs(found.misfit).max())
 
 
+@pytest.mark.parametrize("ball", [None, 40.0])
+def test_lengths_are_those_of_the_families(ball: float | None, tmp_path: Path) -> None:
+    """Members of one family between balls of the same sizes are cut alike; what is left over is named as misfit."""
+    found = st.few_lengths(uneven(6), 0.02, 30)
+    made = st.schedule(read_again(found.grid, tmp_path), replace(TUBE, unit="m", ball=ball), keep_failed=True)
+    lengths, members = made.lengths, made.members
+    deducted = [np.array(members[f"{end} deduction"], float) for end in ("start", "end")]
+    cut = np.array(members["family length"], float) - sum(deducted)
+    row_of = {mark: row for row, mark in enumerate(lengths["length type"])}
+    row = np.array([row_of[mark] for mark in members["length type"]])
+    assert np.abs(np.array(lengths["cut length"], float)[row] - cut).max() <= 1.0 + 1e-9
+    misfit = np.abs(np.array(members["cut length"], float) - np.array(lengths["cut length"], float)[row])
+    worst = [misfit[row == each].max() for each in range(len(row_of))]
+    assert np.array(lengths["largest misfit"], float) == pytest.approx(worst, abs=1e-9)
+    if ball:
+        assert len(row_of) <= len(set(members["family"]))
+
+
 def test_what_is_alike_holds_for_the_nodes_of_before(tmp_path: Path) -> None:
     grid = st.few_lengths(uneven(4), 0.02, 30).grid
     assert grid.alike is not None and grid.replace(certificate=None).alike is grid.alike

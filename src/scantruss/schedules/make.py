@@ -14,6 +14,7 @@ from ..grid.alike import JOINTS, PANELS
 from ..grid.certificate import check_passed
 from ..grid.marks import member_marks, node_marks, panel_marks
 from ..grid.panels import across_of, heights_of
+from ..layouts.kinds import families_of_grid
 from ..settings import UNITS
 from ..structure.truss import Truss
 from .bolts import NO_BOLTS, PITCHES, bolted_radii, choose_bolts
@@ -91,6 +92,7 @@ def schedule(
     radius = np.where(joints.valence > 0, _radii(needed, nodes.types, settings.ball), 0.0)
     length = grid.lengths * size
     cut = length - radius[grid.edges].sum(axis=1)
+    cut_of_family = cut + _to_family(grid) * size
     members = grid.panel_members
     sizes = PanelSizes(np.where(members >= 0, length[members], np.nan))
     if grid.panels is not None:
@@ -114,13 +116,14 @@ def schedule(
             radius=radius,
             length=length,
             cut=cut,
+            cut_of_family=cut_of_family,
             fold=inner_folds(grid),
             node_types=nodes.types,
             node_images=nodes.image,
             panel_sizes=sizes,
             panel_types=panels.types,
             panel_images=panels.image,
-            length_types=cluster_lengths(cut, settings.tolerance, kind),
+            length_types=_length_types(cut, cut_of_family, settings.tolerance, kind),
             node_marks=marks[0],
             member_marks=marks[1],
             panel_marks=panel_marks(grid),
@@ -134,6 +137,21 @@ def _of_structure(settings: ScheduleSettings, truss: Truss) -> ScheduleSettings:
         if getattr(settings, name) != nothing:
             raise InputError(f"a structure has a {name} of its own; leave --{name} out")
     return replace(settings, scale=truss.scale)
+
+
+def _to_family(grid: Grid) -> np.ndarray:
+    """Return by how much each member (E,) is shorter than its family [scan unit]; 0 where lengths were not made few."""
+    if (found := families_of_grid(grid)) is None:
+        return np.zeros(len(grid.edges))
+    lengths, of = found
+    shorter: np.ndarray = lengths[of] - grid.lengths
+    return shorter
+
+
+def _length_types(cut: np.ndarray, cut_of_family: np.ndarray, tolerance: float, kind: np.ndarray | None) -> Clusters:
+    """Return the types of members by the cut lengths (E,) of their families; misfits are of their own cut lengths (E,)."""
+    types = cluster_lengths(cut_of_family, tolerance, kind)
+    return replace(types, misfit=np.abs(cut - cut_of_family[types.representative[types.of]]))
 
 
 def _size(grid: Grid, settings: ScheduleSettings) -> tuple[str, float]:

@@ -45,6 +45,7 @@ class Parts:
     radius: np.ndarray  #: (V,) radius of the balls; 0 without members
     length: np.ndarray  #: (E,)
     cut: np.ndarray  #: (E,) length without the balls
+    cut_of_family: np.ndarray  #: (E,) the same for a member as long as its family; `cut` where there are no families
     panel_sizes: PanelSizes
     fold: np.ndarray  #: (E,) angle between the panels on their inner side; 180 level, NaN at the boundary [degree]
     node_types: Clusters

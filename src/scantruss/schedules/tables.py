@@ -308,12 +308,12 @@ def _panel_types(parts: Parts) -> Schedule:
 def _lengths(parts: Parts) -> Schedule:
     """One row for each type of member."""
     types = parts.length_types
-    total = np.bincount(types.of, parts.cut) / 1000.0
+    total = np.bincount(types.of, parts.cut_of_family) / 1000.0
     stock = parts.stock.columns if parts.forces is not None else ()
     return _types(
         "Lengths", "L", types, parts.member_marks, "mm",
         *(column(each.name, "", [each.values[k] for k in types.representative.tolist()]) for each in stock),
-        column("cut length", "mm", parts.cut[types.representative]), column("total", "m", total, summed=True),
+        column("cut length", "mm", parts.cut_of_family[types.representative]), column("total", "m", total, summed=True),
     )  # fmt: skip
 
 
