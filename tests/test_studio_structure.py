@@ -14,6 +14,7 @@ import scantruss as st
 from scantruss.cli.main import main
 from scantruss.export.formats import model_of
 from scantruss.export.page_tables import colorings_of, tables_of
+from scantruss.studio.compare import structure_figures
 from scantruss.studio.further_files import FURTHER_FILES, PRINTED, PRINTED_BALL, SCHEDULES, further_files
 from scantruss.studio.outputs import settings_files
 from scantruss.studio.session import Session
@@ -63,6 +64,15 @@ def test_sizing_and_modes_are_those_of_the_command_line(tmp_path: Path, monkeypa
     again.open(tmp_path / "dome.scantruss")
     assert again.state.structure_settings == session.state.structure_settings
     assert again.state.report is not None and again.state.report.weights == report.weights
+
+
+def test_the_page_says_whether_buckling_was_looked_at(tmp_path: Path) -> None:
+    session = session_of_dome(tmp_path, 6.0)
+    for modes, said in ((0, "not looked at; set buckling modes to 1"), (1, "ULS")):
+        session.set_structure(loads="self,snow:1kN/m2", buckling=modes)
+        session.run_structure()
+        done(session)
+        assert said in dict(structure_figures(session.state))["lowest buckling factor"]
 
 
 def test_scales_and_weights_are_words_of_the_page() -> None:

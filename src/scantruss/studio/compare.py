@@ -49,6 +49,8 @@ def structure_figures(state: StudioState) -> list[tuple[str, str]]:
         rows.append(("sections", " ".join(values["sections"])))
     if report.buckling is not None and len(report.buckling.values):
         rows.append(("lowest buckling factor", f"{report.buckling.values[0]:.3g}, {report.buckling.of}"))
+    elif report.buckling is None:
+        rows.append(("lowest buckling factor", "not looked at; set buckling modes to 1"))
     if report.vibration is not None and len(report.vibration.values):
         rows.append(("lowest frequency", f"{report.vibration.values[0]:.3g} Hz"))
     return rows

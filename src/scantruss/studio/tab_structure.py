@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..structure.groups import WAYS_TO_GROUP
+from ..structure.report_lines import sizing_lines
 from ..structure.supports import HELD
 from .colours import colors_of, legend_of
 from .compare import structure_figures
@@ -161,6 +162,7 @@ class StructureTab:
             return
         rows = [f"{name} **{value}**" for name, value in structure_figures(state)]
         if state.report is not None:
+            rows += sizing_lines(state.report)
             rows += [f"**warning:** {words}" for words in state.report.warnings]
         self.results.content = "\n\n".join(rows)
         weights = state.report.weights if state.report is not None else None
