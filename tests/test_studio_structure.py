@@ -134,3 +134,22 @@ def test_what_was_asked_for_since_the_structure_was_solved_is_kept_beside_it(tmp
     assert b'supports = "boundary"' in settings_files(again.state)["structure.toml"]
     again.run_structure()
     assert again.worker.wait(120) and again.message and again.state.shown_structure == before
+
+
+def test_the_end_of_a_front_is_what_is_seen_until_the_grid_is_made(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Fronts come faster than pictures of them."""
+    session = session_of_dome(tmp_path, 6.0)
+    shown: list[bool] = []
+    see = session._see_front
+
+    def looked(nodes: np.ndarray, triangles: np.ndarray) -> None:
+        see(nodes, triangles)
+        shown.append(session.front is not None and session.front[1] is triangles)
+
+    monkeypatch.setattr(session, "_see_front", looked)
+    session.generate()
+    done(session)
+    assert session.grid is not None and session.front is None
+    assert len(shown) > 3 and all(shown)

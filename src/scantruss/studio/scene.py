@@ -57,7 +57,7 @@ class Scene:
         scene.set_up_direction("+z")
         self.light(False)
         self._scan_key: tuple[Any, ...] = ()
-        self._draws_front = False
+        self._front: tuple[np.ndarray, np.ndarray] | None = None
         self._scan_legend = ""
 
     def scan(self, state: StudioState, wanted: str, section: SectionPlane | None, most: int = DRAWN_POINTS) -> str:
@@ -229,17 +229,18 @@ class Scene:
 
     def front(self, frame: SceneFrame | None, front: tuple[np.ndarray, np.ndarray] | None) -> None:
         """Draw a front that advances, nodes (V, 3) [scan unit] and triangles (T, 3), in place of the grid; None draws the grid again."""
-        if front is None or frame is None:
-            if self._draws_front:
-                self.panels("/front", NOWHERE, NO_TRIANGLES, None, None)
-        elif len(front[1]):
+        front = front if frame is not None and front is not None and len(front[1]) else None
+        if front is self._front:
+            return
+        if frame is None or front is None:
+            self.panels("/front", NOWHERE, NO_TRIANGLES, None, None)
+        else:
             nodes, triangles = front
             self.panels(
                 "/front", frame.to_scene(nodes), triangles, np.broadcast_to(FRONT_COLOR, (len(triangles), 3)), None
             )
-        shown = front is not None and frame is not None
-        if shown != self._draws_front:
-            self._draws_front = shown
+        before, self._front = self._front, front
+        if (shown := front is not None) != (before is not None):
             for name in GRID_PARTS:
                 if (handle := self.api.get_handle_by_name(name)) is not None:
                     handle.visible = not shown

@@ -112,9 +112,10 @@ class Session(TradeSteps):
         self._find_features(progress)
 
     def _see_front(self, nodes: np.ndarray, triangles: np.ndarray) -> None:
-        """Show a front while it advances, a few times a second."""
+        """Show a front while it advances, a few times a second; its end is there until the grid is."""
+        self.front = nodes, triangles
         if monotonic() - self._front_seen >= SECONDS_OF_FRONT:
-            self.front, self._front_seen = (nodes, triangles), monotonic()
+            self._front_seen = monotonic()
             self.tell()
 
     # ---- holes, ridges, fixed nodes
