@@ -21,6 +21,7 @@ from scantruss.layouts.on_scan import ScanOfGrid
 from scantruss.layouts.trade import COUNTS, traded_lengths
 from scantruss.runtime.progress import Progress
 from scantruss.studio import trade_steps
+from scantruss.studio.head import words_of_session
 from scantruss.studio.session import Session
 from scantruss.studio.worker import StoppedError, Worker
 
@@ -228,6 +229,28 @@ def test_a_quick_task_is_taken_while_one_that_was_stopped_comes_to_its_end() -> 
     assert worker.ask(lambda progress: seen.append("quick"), quick=True)
     let.set()
     assert worker.wait(30.0) and seen == ["quick"]
+
+
+def test_stop_says_that_it_stops_and_that_it_has(tmp_path: Path) -> None:
+    session = session_of_dome(tmp_path, 10.0)
+    begun, let = Event(), Event()
+
+    def long(progress: Progress) -> None:
+        progress("boundary", 0.5)
+        begun.set()
+        let.wait(30.0)
+        progress("front", 0.5)
+
+    session.worker.ask(long)
+    assert begun.wait(30.0) and words_of_session(session) == "boundary"
+    session.stop()
+    assert words_of_session(session) == "stopping"
+    let.set()
+    assert session.worker.wait(30.0) and words_of_session(session).startswith("stopped")
+    session.worker.ask(lambda progress: progress("boundary", 0.5))
+    assert session.worker.wait(30.0) and not words_of_session(session).startswith("stopped")
+    session.stop()
+    assert not words_of_session(session).startswith("stop")
 
 
 def test_quick_tasks_of_another_kind_do_not_replace_one_another(tmp_path: Path) -> None:

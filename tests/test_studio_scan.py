@@ -83,6 +83,13 @@ def test_what_is_red_goes_and_the_command_line_does_the_same(
     assert session.worker.wait(PATIENCE) and session.message == ""
     found = session.proposed()
     assert found is not None and session.cloud is before
+    session.propose_cleaning(0.0, 0.0)
+    assert session.worker.wait(PATIENCE)
+    with pytest.raises(st.InputError, match="nothing is red"):
+        session.clean()
+    assert session.cloud is before
+    session.propose_cleaning(3.0, 0.005)
+    assert session.worker.wait(PATIENCE)
     high = before.points[:, 2] + before.origin[2] > 105
     assert found.removes[high].all() and found.removes.sum() == high.sum() == 8
     session.clean()

@@ -37,7 +37,9 @@ def words_of_session(session: Session) -> str:
     if session.message:
         return f'<div class="studio-refused"><b>Refused:</b> {escape(session.message)}</div>'
     if session.stage:
-        return escape(session.stage)
+        return "stopping" if session.worker.is_stopping else escape(session.stage)
+    if session.was_stopped:
+        return "stopped; what was there before is kept"
     if session.state.is_stale:
         return "The grid was made before the last change: press <b>Generate</b>"
     if session.state.is_structure_stale:

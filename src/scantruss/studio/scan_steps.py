@@ -232,13 +232,15 @@ class ScanSteps(Steps):
         Raises
         ------
         InputError
-            None are.
+            None are, or the scan has been cleaned.
         """
         proposal = self.proposed()
         if proposal is None or self.state.whole is None:
             raise InputError("nothing is shown in red yet; press Show what goes")
         if self.state.cleaning is not None:
             raise InputError("the scan has been cleaned already; take that back with Undo to clean it otherwise")
+        if not proposal.removes.any():
+            raise InputError("nothing is red: there is nothing to clean")
         removes = self.state.taken()
         removes[removes] = proposal.removes
         self._take(

@@ -37,6 +37,7 @@ class Steps:
         self.history = History()
         self.message = ""  #: why the last step was refused, in the words of the command line
         self.stage, self.share = "", 0.0
+        self.was_stopped = False  #: whether the last task was
         self.worker = Worker(self._end, self._progress)
         self._listeners: list[Callable[[], None]] = []
         self._turn = 0  # counts what makes the result of a running task unwanted
@@ -130,8 +131,9 @@ class Steps:
         """Make again what the page draws of a state and its record does not hold."""
 
     def stop(self) -> None:
-        """Stop what runs; the grid before it stays."""
+        """Stop what runs; what was there before it stays."""
         self.worker.stop()
+        self.tell()
 
     def save(self) -> None:
         """Save the project, where there is a place for it: written beside it, then renamed."""
@@ -143,11 +145,11 @@ class Steps:
 
     def _progress(self, stage: str, share: float) -> None:
         changed = stage != self.stage or abs(share - self.share) >= 0.02
-        self.stage, self.share = stage, share
+        self.stage, self.share, self.was_stopped = stage, share, False
         if changed:
             self.tell()
 
     def _end(self, error: Exception | None) -> None:
-        self.stage, self.share = "", 0.0
+        self.stage, self.share, self.was_stopped = "", 0.0, self.worker.is_stopping
         self.message = "" if error is None else words_of(error)
         self.tell()

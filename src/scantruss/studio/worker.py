@@ -72,6 +72,12 @@ class Worker:
         with self._change:
             self._waiting, self._stop = [], True
 
+    @property
+    def is_stopping(self) -> bool:
+        """Whether what runs has been stopped and has not come to its end."""
+        with self._change:
+            return self._stop and self._running is not None
+
     def wait(self, seconds: float) -> bool:
         """Wait until nothing runs or waits; whether that is so."""
         with self._change:
