@@ -24,6 +24,7 @@ from .features import Feature, find_features, switched_off
 from .outputs import command_of, files_of, model_to_show
 from .scan_steps import NO_GRID
 from .solving import check_words, solved_state
+from .support_places import placed, supports_on
 from .trade_steps import TradeSteps
 
 SECONDS_OF_FRONT = 0.2  #: between two pictures of a front [s]
@@ -102,6 +103,7 @@ class Session(TradeSteps):
         with self._lock:
             if turn != self._turn or (live and len(grid.edges) > MOST_LIVE_MEMBERS):
                 return
+            made |= supports_on(self.state, grid)
             if live:
                 self.state = replace(self.state, **made)
             else:
@@ -182,7 +184,8 @@ class Session(TradeSteps):
             given["loads"] = loads_of_words(str(given["loads"]))
         settings = self.state.structure_settings.replace(**given)
         if settings != self.state.structure_settings:
-            self.change("structure", structure_settings=settings)
+            places = placed(settings.supports, self.state.support_places, self.grid)
+            self.change("structure", structure_settings=settings, support_places=places)
             self.save()
 
     def run_structure(self) -> None:

@@ -17,6 +17,8 @@ from .scan_parts import Cleaning, WholeScan, taken_of_scan
 
 MOST_UNDONE = 200  #: that can be taken back
 NO_LENGTH = Settings(length=1.0)  #: of a studio without a scan
+Placed = tuple[tuple[str, tuple[float, float, float]], ...]
+"""Marks of nodes and their places in the frame of the scan [scan unit]."""
 DEFAULT_STRUCTURE = StructureSettings(supports="boundary", loads=("self", "snow:1kN/m2"), frequencies=3)
 
 
@@ -55,6 +57,7 @@ class StudioState:
     trade: Trade | None = None  #: of the grid, or of the one that it was made of
     is_live: bool = False  #: whether the grid is a quick one, made while the length was chosen
     structure_settings: StructureSettings = DEFAULT_STRUCTURE
+    support_places: Placed = ()  #: of the nodes that its supports name
     solution: Solution | None = None
     solved_with: StructureSettings | None = None  #: with which it was solved
     report: StructureReport | None = None
