@@ -56,6 +56,7 @@ def save_project(path: Path, state: StudioState) -> None:
         "settings": state.settings.to_dict(), "solved": solved, "quick": state.is_live,
         "asked": None if state.asked is None else state.asked.to_dict(),
         "tape": [list(end) for end in state.tape],
+        "unpainted": state.unpainted,
         "support_places": [[mark, list(place)] for mark, place in state.support_places],
         "designs": [{"name": each.name, "figures": [list(row) for row in each.figures]} for each in state.designs],
     }  # fmt: skip
@@ -175,6 +176,7 @@ def _project_of(parts: dict[str, bytes]) -> tuple[StudioState, bool]:
     state = StudioState(
         cloud=part_of_scan(whole, settings, cleaning, removed),
         settings=settings,
+        unpainted=float(head.get("unpainted", 1.0)),
         grid=grid,
         asked=None if asked is None else Settings.from_dict(asked),
         trade=trade_of_parts(parts, grid, _grid_of),

@@ -136,7 +136,7 @@ class ScanSteps(Steps):
         cloud = whole.cloud
         made = settings or Settings(length=suggest_length(cloud), unit=cloud.unit)
         state = replace(
-            self.state, whole=whole, cloud=cloud, cleaning=None, removed=None, tape=(), settings=made,
+            self.state, whole=whole, cloud=cloud, cleaning=None, removed=None, tape=(), settings=made, unpainted=1.0,
             structure_settings=for_new_scan(self.state.structure_settings), solved_with=None, support_places=(), **NO_GRID,
         )  # fmt: skip
         number, place = self._place_for(cloud.name or "scan")

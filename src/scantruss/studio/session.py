@@ -15,7 +15,7 @@ from ..export.model import Model
 from ..pipeline import grid_from_cloud
 from ..runtime.progress import Progress, WatchedProgress
 from ..scan.cloud import PointCloud
-from ..scan.member_length import exact_range
+from ..scan.member_length import check_length, exact_range
 from ..settings import Settings
 from ..structure.options import loads_of_words
 from ..surface.samples import sample_surface
@@ -60,6 +60,9 @@ class Session(TradeSteps):
         if settings == self.settings and self.grid is not None:
             return
         self.change(words, settings=settings)
+        self._show_change()
+
+    def _show_change(self) -> None:
         self.save()
         self.tell()
         self._ask_live()
@@ -70,9 +73,35 @@ class Session(TradeSteps):
         self.save()
         self.tell()
 
+    def set_length(self, length: float) -> None:
+        """Take a length of members, and show a quick grid with it.
+
+        Raises
+        ------
+        InputError
+            No grid of this scan can have it.
+        """
+        settings = self.state.with_main_length(length)
+        if self.cloud is not None:
+            check_length(self.cloud, settings)
+        self.set("length", length=settings.length)
+
+    def paint(self, made: Settings) -> None:
+        """Take settings with other lengths at some places; the length elsewhere stays."""
+        main = self.state.main_length
+        self.change("paint", settings=made, unpainted=main / made.length)
+        self._show_change()
+
+    def unpaint(self) -> None:
+        """Take one length everywhere: that of where none was painted."""
+        settings = self.settings.replace(length=self.state.main_length, length_field="")
+        if settings != self.settings:
+            self.change("no length field", settings=settings, unpainted=1.0)
+            self._show_change()
+
     def live(self, length: float) -> bool:
         """Make a quick grid of a length, unless a run that was asked for is under way; the newest request wins."""
-        self.change("slider", goes_on=True, settings=self.settings.replace(length=length))
+        self.change("slider", goes_on=True, settings=self.state.with_main_length(length))
         return self._ask_live()
 
     def show_quick(self) -> bool:

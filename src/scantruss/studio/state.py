@@ -52,6 +52,7 @@ class StudioState:
     cloud: PointCloud | None = None
     opened: int = 0  #: how many scans and projects were opened before it and with it; each has a project file
     settings: Settings = NO_LENGTH
+    unpainted: float = 1.0  #: length of members where no other is painted, over the shortest that is painted
     grid: Grid | None = None
     asked: Settings | None = None  #: with which the grid was asked for; its own say what was done to get it
     trade: Trade | None = None  #: of the grid, or of the one that it was made of
@@ -79,6 +80,15 @@ class StudioState:
         assert self.whole is not None
         all_of_it = self.settings.replace(crop=())
         return taken_of_scan(self.whole, all_of_it, self.cleaning, self.removed) & ~self.taken()
+
+    @property
+    def main_length(self) -> float:
+        """Return the length of members where no other is painted [scan unit]."""
+        return self.settings.length * (self.unpainted if self.settings.length_field else 1.0)
+
+    def with_main_length(self, length: float) -> Settings:
+        """Return the settings with another length of members where none is painted; painted ones change with it."""
+        return self.settings.replace(length=length * self.settings.length / self.main_length)
 
     @property
     def shown_structure(self) -> StructureSettings:
