@@ -17,6 +17,7 @@ from .colours import colors_of, legend_of
 from .compare import structure_figures
 from .frame import DRAWN_EXTENT
 from .outputs import PREVIEW_WORDS
+from .page_words import in_words_of_page
 from .scene import barbed, spread
 from .session import STRUCTURE_WORDS
 from .support_places import marks_of, switched, words_of_lost
@@ -227,7 +228,7 @@ class StructureTab:
         rows = [f"**before the last change**, {words_of_asked(state)}:"] if state.is_structure_stale else []
         rows += [f"{name} **{value}**" for name, value in structure_figures(state)]
         if state.report is not None:
-            rows += [f"**warning:** {words}" for words in state.report.warnings]
+            rows += [f"**warning:** {in_words_of_page(words)}" for words in state.report.warnings]
         self.results.content = "\n\n".join(rows)
 
     def _shapes(self, state: StudioState) -> dict[str, np.ndarray]:
