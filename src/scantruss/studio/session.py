@@ -21,7 +21,7 @@ from ..structure.options import loads_of_words
 from ..surface.samples import sample_surface
 from .compare import kept_design
 from .features import Feature, find_features, switched_off
-from .outputs import command_of, files_of, model_to_show
+from .outputs import EFFORT_OF_PREVIEW, command_of, files_of, model_to_show
 from .scan_steps import NO_GRID
 from .solving import check_words, solved_state
 from .support_places import placed, supports_on
@@ -109,7 +109,7 @@ class Session(TradeSteps):
         return self.cloud is not None and self.grid is None and self._ask_live()
 
     def _ask_live(self) -> bool:
-        return self.worker.ask(lambda progress: self._make("quick", progress, live=True), quick=True)
+        return self.worker.ask(lambda progress: self._make(EFFORT_OF_PREVIEW, progress, live=True), quick=True)
 
     def generate(self) -> None:
         """Make the grid with the effort of the settings."""
