@@ -111,3 +111,14 @@ def test_undo_drops_the_last_corner_of_a_polygon_and_one_that_crosses_itself_is_
         assert until(lambda: field(page, "crop").input_value().count(",") == 5)
         assert session.state.tape and session.history.words[0] == "tape"  # which stays
         assert errors == []
+
+
+def test_a_page_says_when_the_server_has_gone(tmp_path: Path) -> None:
+    with served_dome(tmp_path) as (address, session, server), open_page(address) as (page, errors):
+        ready(page, session)
+        page.wait_for_timeout(4000)  # it asks once
+        assert page.locator("text=Connection lost").count() == 0
+        server.stop()
+        page.wait_for_selector("text=Connection lost", timeout=15_000)
+        page.screenshot(path=str(tmp_path / "lost.png"))
+        assert errors == []

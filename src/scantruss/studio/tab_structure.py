@@ -38,7 +38,7 @@ SWINGS = 3  #: of a mode while it is shown
 AS_BUILT = "as built"
 SUPPORT_MODE = "support"
 SIZING = "Sizing and modes"
-CHOSEN = ("support_type", "size_by")  #: what is chosen from a list
+FROM_LISTS = ("support_type", "size_by")  #: what is chosen from a list
 
 
 def scale_of_text(text: str) -> float:
@@ -125,7 +125,7 @@ class StructureTab:
             each.on_update(view.step(self.draw))
         for name, each in (self.words | self.numbers).items():
             take = partial(self._take, name)
-            if name in CHOSEN:
+            if name in FROM_LISTS:
                 each.on_update(view.step(take))
             else:
                 view.typed(each, take)
@@ -167,7 +167,7 @@ class StructureTab:
         asked = state.structure_settings
         for name in STRUCTURE_WORDS:
             value = getattr(asked, name)
-            if name in CHOSEN:
+            if name in FROM_LISTS:
                 self.words[name].value = value
             elif name != "loads":
                 self.view.show_text(self.words[name], value)
