@@ -31,7 +31,7 @@ def test_a_node_on_a_pole_under_the_roof_is_a_fault_with_its_place() -> None:
     hanging = grid.replace(nodes=nodes)
     (fault,) = (fault for fault in certify(hanging, samples, NOTHING, SETTINGS).faults if fault.kind == "hanging")
     assert known(fault.where) == pytest.approx((0.0, 0.0, -0.8), abs=1e-9)
-    with pytest.raises(CertificateError, match="hangs on points off the surface.*--crop or --piece"):
+    with pytest.raises(CertificateError, match=r"hangs on points off the surface.*--crop or --piece"):
         certified(hanging, samples, NOTHING, SETTINGS)
 
 
