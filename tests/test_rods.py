@@ -15,9 +15,12 @@ from scantruss.check.distances import boxes_of
 from scantruss.cli.main import main
 from scantruss.cli.shared import box_around
 from scantruss.kernels.surface.rods import spreads_around
+from scantruss.scan.clean.outliers import some_stand_alone
 from scantruss.scan.member_length import length_range
+from scantruss.surface.chosen_samples import ROD
 from scantruss.surface.linked_samples import link_samples
-from scantruss.surface.rods import rod_points
+from scantruss.surface.rods import LENGTH_STEP, lengths_of_rods, rod_points
+from scantruss.surface.samples import sample_surface
 from scantruss.surface.supports import support_samples
 
 LENGTH = 1.4
@@ -128,6 +131,55 @@ def test_the_box_of_a_piece_holds_it_and_little_else_wherever_it_lies(at: tuple[
     high = low + 100 * margin
     box = np.reshape([float(word) for word in box_around(low, high, margin).split(",")], (2, 3))
     assert np.allclose(box, [low - margin, high + margin], rtol=0, atol=0.1 * margin)
+
+
+@pytest.fixture(scope="module")
+def scaffolded() -> tuple[np.ndarray, np.ndarray]:
+    """A roof and a scaffold close under it; and which points are of the scaffold."""
+    rng = np.random.default_rng(5)
+    poles = [pole(rng, x, y, 0.0, 4.4, 0.03, 250) for x in (-5, -2.5, 0, 2.5, 5) for y in (-2.5, 0, 2.5)]
+    ledgers = [
+        np.column_stack([rng.uniform(-5, 5, 500), rng.normal(y, 0.02, 500), rng.normal(z, 0.02, 500)])
+        for y in (-2.5, 0, 2.5)
+        for z in (1.6, 3.0, 4.2)
+    ]
+    parts = [roof(rng), *poles, *ledgers]
+    return np.concatenate(parts), np.repeat([False, *([True] * (len(parts) - 1))], [len(part) for part in parts])
+
+
+@pytest.mark.parametrize("length", [1.3, 2.1, 3.3])
+def test_a_scaffold_is_known_however_long_the_members(scaffolded: tuple[np.ndarray, np.ndarray], length: float) -> None:
+    """Members as long as the poles are apart see a thick layer of roof and scaffold."""
+    points, scaffold = scaffolded
+    samples = sample_surface(st.PointCloud.from_array(points), st.Settings(length=length, keep_rods=False))
+    rods = samples.judged == ROD
+    assert not rods[~scaffold].any() and rods[scaffold].mean() > 0.99
+
+
+def test_a_grid_over_a_scaffold_keeps_to_its_roof(scaffolded: tuple[np.ndarray, np.ndarray]) -> None:
+    grid = st.grid_from_points(scaffolded[0], st.Settings(length=2.6, effort="quick"))
+    assert known(grid.certificate).passed and grid.topology.boundary_loops == 1
+    x, y, z = grid.scan_nodes.T
+    assert np.abs(z - 6.0 + 0.03 * x * x + 0.04 * y * y).max() < 0.1
+
+
+def test_rods_are_looked_for_from_a_few_spacings_up_to_the_length_asked_for() -> None:
+    assert lengths_of_rods(1.0, 0.05) == [1.0]
+    lengths = lengths_of_rods(5.0, 0.05)
+    steps = np.divide(lengths[1:], lengths[:-1])
+    assert lengths[0] == pytest.approx(1.2) and lengths[-1] == 5.0
+    assert steps.max() == pytest.approx(LENGTH_STEP) and steps.min() > 1.0
+    assert lengths_of_rods(5.0, 0.0) == [5.0]
+
+
+def test_poles_by_themselves_are_no_outliers_to_the_grid_where_cleaning_finds_none(
+    scaffolded: tuple[np.ndarray, np.ndarray],
+) -> None:
+    """Samples along a pole have few others near them, but no point stands alone."""
+    cloud = st.PointCloud.from_array(scaffolded[0])
+    assert not some_stand_alone(cloud.points, cloud.spacing)
+    for spacings in (12, 16, 20, 24, 40):
+        assert sample_surface(cloud, st.Settings(length=spacings * cloud.spacing)).outliers == 0
 
 
 @pytest.mark.parametrize("length", [1.0, 3.0])

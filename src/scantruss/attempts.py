@@ -93,7 +93,7 @@ def attempts(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:
     """
     first, again, *others = _same_scan(settings)
     yield first
-    hall = settings.keep_rods and settings.method == "default" and _is_hall(cloud, settings)
+    hall = settings.keep_rods and settings.method == "default" and _stands_on_rods(cloud, settings)
     if hall:  # no other front would get around its columns
         yield from _same_scan(settings.replace(keep_rods=False))
     yield again
@@ -101,7 +101,9 @@ def attempts(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:
     yield from map(Attempt, looks)  # where edges, limbs or slits are in the way, other fronts seldom help
     yield from others
     samples = sample_surface(cloud, settings)
-    rough, cut = samples.rough, len(samples.rings) > 0
+    cut = len(samples.rings) > 0
+    # a mean surface of a shell and its scaffold is neither
+    rough = (sample_surface(cloud, settings.replace(keep_rods=False)) if hall else samples).rough
     if cut:  # fewer limbs cut off, then none
         for share in THINNER:
             yield Attempt(settings.replace(limb_girth=share * settings.limb_girth))
@@ -180,11 +182,13 @@ def _has_rods(cloud: PointCloud, settings: Settings) -> bool:
     return bool((without.judged == ROD).any()) and not sample_surface(cloud, settings).rings
 
 
-def _is_hall(cloud: PointCloud, settings: Settings) -> bool:
-    """Whether the scan falls apart without such parts, as a hall does into its roof and its floor."""
+def _stands_on_rods(cloud: PointCloud, settings: Settings) -> bool:
+    """Whether the scan falls apart without such parts, as a hall does into its roof and its floor, or is rough for them alone."""
     cut, without = sample_surface(cloud, settings), sample_surface(cloud, settings.replace(keep_rods=False))
+    if not (without.judged == ROD).any():
+        return False
     parts = [len(each.pieces) + len(each.not_chosen) for each in (cut, without)]
-    return bool((without.judged == ROD).any()) and parts[1] > parts[0]
+    return parts[1] > parts[0] or (cut.rough > VERY_ROUGH_SCAN and without.rough <= ROUGH_SCAN)
 
 
 def _smoothed(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:

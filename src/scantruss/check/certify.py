@@ -22,6 +22,7 @@ from .distances import Distances, measure_distances, offsets_from_points
 from .doubtful import doubtful_places
 from .folds import fold_angles
 from .gaps import bridged_gaps
+from .hanging import hanging_nodes
 from .irregular import count_irregular
 from .left_out import closed_holes, first_and_more, parts_left_out
 from .limits import ROUNDED_BY, limits_of, places_to_look_at, widened_limits
@@ -131,7 +132,8 @@ def judge(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings: Set
     faults = [*faults_of_topology(grid, certificate, boundary), *faults_in_space(grid, certificate, cuts, settings)]
     too_far, poor = limits_of(grid, found, settings)
     known = {fault.kind for fault in faults}
-    faults += [fault for fault in (*too_far, *faults_on_sheets(grid, samples, nearest)) if fault.kind not in known]
+    further = (*too_far, *faults_on_sheets(grid, samples, nearest), *hanging_nodes(grid, samples, found, length))
+    faults += [fault for fault in further if fault.kind not in known]
     certificate = replace(certificate, faults=tuple(faults), warnings=tuple(poor), widened=widened_limits(settings))
     return Judged(grid, samples, boundary, settings, certificate, found)
 
@@ -174,6 +176,8 @@ def _way_out(found: Certificate) -> str:
     kinds = {fault.kind for fault in found.faults}
     if kinds == {"cover"} and found.missing > MOST_ACCEPTED:
         return "choose the part that is wanted with --crop or --piece; --keep-failed gives it all the same"
+    if "hanging" in kinds:
+        return "--crop or --piece leaves out what lies off the surface, shorter members keep to it; --keep-failed gives it all the same"
     if kinds == {"cover"} and found.missing > 0.0:
         return f"--allow-missing {math.ceil(100.0 * found.missing) / 100.0:g} accepts that"
     return "--keep-failed gives it all the same"

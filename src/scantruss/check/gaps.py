@@ -102,11 +102,11 @@ def is_empty_within(curve: np.ndarray, points: np.ndarray) -> bool:
     normal = np.linalg.svd(curve - middle)[2][2]
     reach = float(np.linalg.norm(curve - middle, axis=1).max())
     place = _emptiest(middle, normal, reach, points)  # a curve of few samples is not around the middle of its hole
-    away = float(np.linalg.norm(_within(place, reach, points) - place, axis=1).min(initial=reach))
+    away = float(np.linalg.norm(points_within(place, reach, points) - place, axis=1).min(initial=reach))
     return empty_disc(place, normal, away, points) > 0.0
 
 
-def _within(place: np.ndarray, reach: float, points: np.ndarray) -> np.ndarray:
+def points_within(place: np.ndarray, reach: float, points: np.ndarray) -> np.ndarray:
     """Return the points (K, 3) of those by ascending x (N, 3) that lie within reach of a place."""
     begin, end = np.searchsorted(points[:, 0], [place[0] - reach, place[0] + reach])
     around = points[begin:end]
@@ -117,7 +117,7 @@ def _within(place: np.ndarray, reach: float, points: np.ndarray) -> np.ndarray:
 def _emptiest(middle: np.ndarray, normal: np.ndarray, reach: float, points: np.ndarray) -> np.ndarray:
     """Return the place (3,) in the plane around another that is farthest from all points (N, 3) by ascending x."""
     axes = np.linalg.svd(normal[None])[2][1:]
-    around = _within(middle, 2.0 * reach, points)
+    around = points_within(middle, 2.0 * reach, points)
     places: np.ndarray = middle + reach * ACROSS @ axes
     away = [np.linalg.norm(around - place, axis=1).min(initial=reach) for place in places]
     return places[int(np.argmax(away))]
@@ -135,7 +135,7 @@ def empty_disc(place: np.ndarray, normal: np.ndarray, away: float, points: np.nd
 
 def _level(place: np.ndarray, normal: np.ndarray, away: float, points: np.ndarray) -> np.ndarray:
     """Return the distances in the plane at a place of the points near it (K,); parameters as of `empty_disc`."""
-    around = _within(place, 3.0 * away, points) - place
+    around = points_within(place, 3.0 * away, points) - place
     height = around @ normal
     level: np.ndarray = np.sqrt(np.maximum((around**2).sum(axis=1) - height**2, 0.0))[np.abs(height) <= 2.0 * away]
     return level

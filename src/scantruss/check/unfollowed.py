@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..grid.certificate import Fault, place_of
+from .folds import fold_angles
 from .left_out import points_together
 
 if TYPE_CHECKING:
@@ -14,10 +15,12 @@ if TYPE_CHECKING:
     from ..surface.samples import SurfaceSamples
     from .distances import Distances
 
-# distance from the grid, beyond the noise, from which on points are not followed [member lengths]: members that span a surface with a
-# radius of one member lie that far off it
-NOT_FOLLOWED = 0.125
-CUBE = 0.25  # side of the cubes in which most points must lie that far off [member lengths]
+# distance from the grid, beyond the noise, from which on points are not followed: at most, as members that span a surface with a radius
+# of one member lie that far off it, and at least [member lengths]; in between by the folds between a triangle and its neighbours
+NOT_FOLLOWED, LEVEL_NOT_FOLLOWED = 0.125, 0.02
+SAG_OF_FOLD = 0.43  # ... of a bent surface, with half as much again to be sure [member lengths, at a radian]
+CUBE, LEAST_CUBE = 0.25, 0.1  # widest and narrowest cubes in which most points must lie that far off [member lengths]
+SPACINGS_OF_CUBE = 4.0  # width of the cubes between these: some points lie in each [spacings of the points]
 LONG = 6.0  # longest side of the box around such a part from which on it is no bump that members round off [member lengths]
 WARN_SHARE = 0.01  # share of the points in such a part from which on it is said
 
@@ -36,10 +39,11 @@ def unfollowed_parts(
     """
     noise = float(np.median(found.noise))
     near = np.flatnonzero(chosen & (found.scan <= members))
-    off = found.scan[near] > NOT_FOLLOWED * members[near] + noise
+    off = found.scan[near] > _followed_to(grid)[found.triangle[near]] * members[near] + noise
     if off.sum() < WARN_SHARE * len(samples.scan):
         return []
-    side = CUBE * float(members.max())
+    longest = float(members.max())
+    side = min(max(SPACINGS_OF_CUBE * samples.spacing, LEAST_CUBE * longest), CUBE * longest)
     which = near[off & _mostly(off, samples.scan[near], side)]
     if not len(which):
         return []
@@ -51,6 +55,16 @@ def unfollowed_parts(
         if len(own) >= WARN_SHARE * len(samples.scan) and _size(own, samples) >= LONG * members[own].mean()
     ]
     return [_warning(grid, samples, found, long)] if long else []
+
+
+def _followed_to(grid: Grid) -> np.ndarray:
+    """Return up to which distance from each triangle (T,) points are followed, noise aside: as far as a surface so bent [member lengths]."""
+    folds, bend = np.radians(180.0 - fold_angles(grid)), np.zeros(len(grid.triangles))
+    for triangles in grid.edge_triangles.T:
+        known = (triangles >= 0) & np.isfinite(folds)
+        np.maximum.at(bend, triangles[known], folds[known])
+    followed: np.ndarray = np.minimum(SAG_OF_FOLD * bend + LEVEL_NOT_FOLLOWED, NOT_FOLLOWED)
+    return followed
 
 
 def _mostly(off: np.ndarray, points: np.ndarray, side: float) -> np.ndarray:

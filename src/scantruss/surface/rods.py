@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from ..kernels.geometry.components import component_labels
@@ -17,7 +19,19 @@ END_OFFSET = 0.1  # distance from the sheet above which a sample near a rod is a
 MOST_RODS = 0.4  # share of the samples above which they are not rods but the scan itself
 END_ROUNDS = 3  # most rounds in which ends of rods are looked for
 FEWEST_SAMPLES_AROUND = 24  # samples in a usual neighbourhood that distinguish a rod from a sheet
+FINE_LENGTH = 24.0  # shortest length at which rods of long members are looked for too [spacings of the points]
+LENGTH_STEP = 1.6  # step from one such length to the next
+NEAR_RODS = 3.0  # distance between samples that are beside each other there [sample radii]
+AREA_OF_REST = 1.0  # area of a part beside rods below which it is a piece of them [square of the member length]
 ROD_DISTANCE = 0.8  # distance from all sheets at which a rod stands at one place at least [member lengths]
+
+
+def lengths_of_rods(length: float, spacing: float) -> list[float]:
+    """Return the lengths at which rods are looked for, the shortest first and the desired member length last [scan unit]."""
+    if not spacing > 0.0:
+        return [length]
+    steps = max(math.ceil(math.log(length / (FINE_LENGTH * spacing)) / math.log(LENGTH_STEP)), 0)
+    return [*(FINE_LENGTH * spacing * LENGTH_STEP**step for step in range(steps)), length]
 
 
 def rod_points(found: Linked, points: int, length: float, supports: np.ndarray | None = None) -> np.ndarray:
@@ -50,6 +64,30 @@ def rod_points(found: Linked, points: int, length: float, supports: np.ndarray |
         rod[:] = False
     marked: np.ndarray = np.where(found.owner >= 0, rod[found.owner], False)
     return marked if len(marked) == points else np.zeros(points, np.bool_)
+
+
+def pieces_of_rods(found: Linked, rods: np.ndarray, radius: float, length: float) -> np.ndarray:
+    """Return which points (N,) bool are what is left between rods: small parts with nothing else near them.
+
+    Parameters
+    ----------
+    found : the samples of the points at the shortest length, and their radius [scan unit]
+    rods : (N,) bool, points of rods
+    length : desired member length [scan unit]
+    """
+    samples = len(found.mean)
+    rod = 2 * np.bincount(found.owner, rods, samples) > np.bincount(found.owner, minlength=samples)
+    one, place = np.nonzero(found.neighbors >= 0)
+    other = found.neighbors[one, place]
+    near = np.linalg.norm(found.mean[one] - found.mean[other], axis=1) < NEAR_RODS * radius
+    one, other = one[near], other[near]
+    alike = rod[one] == rod[other]
+    label = component_labels(samples, one[alike], other[alike])
+    touching = np.zeros(samples, np.bool_)
+    touching[label[one[~alike]]] = True
+    small = np.bincount(label, minlength=samples) * radius**2 < AREA_OF_REST * length**2
+    marked: np.ndarray = (rod | (touching & small)[label])[found.owner]
+    return marked
 
 
 def _long_groups(found: Linked, rod: np.ndarray, known: np.ndarray, length: float) -> np.ndarray:

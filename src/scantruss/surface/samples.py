@@ -34,10 +34,10 @@ from .faced_surface import faced_surface
 from .floor import find_floor
 from .given_normals import GivenNormals, given_normals
 from .limbs import LimbRing, cut_limbs
-from .linked_samples import LINKED_POINTS_PER_THREAD, PATCH_SPACING, group, link_samples
+from .linked_samples import LINKED_POINTS_PER_THREAD, PATCH_SPACING, Linked, group, link_samples
 from .owners import owners_of
 from .pieces import chosen_pieces, large_pieces, number_pieces, sample_areas
-from .rods import rod_points
+from .rods import lengths_of_rods, pieces_of_rods, rod_points
 from .shape import check_is_surface, layers_of_surface
 from .size_field import length_field
 from .streamline import points_near
@@ -341,8 +341,20 @@ def _faced(chosen: ChosenSamples, spacing: float, asked: Asked) -> tuple[Surface
 
 
 def _rods_of(points: np.ndarray, spacing: float, asked: Asked) -> np.ndarray:
-    """Return which points (N, 3) belong to rods, (N,) bool."""
-    radius = radius_of_samples(asked, spacing)
-    found = link_samples(points, radius, asked.length, spacing)
-    supports = support_samples(found, asked.length) if asked.z_is_up else None
-    return rod_points(found, len(points), asked.length, supports)
+    """Return which points (N, 3) belong to rods, (N,) bool: seen at shorter lengths too, as long members blur a scaffold with its shell."""
+    lengths = lengths_of_rods(asked.length, spacing)
+    radii = [radius_of_samples(asked._replace(length=length), spacing) for length in lengths]
+    finest = link_samples(points, radii[0], lengths[0], spacing)
+    rods = _rods_at(lengths[0], finest, len(points), asked)
+    for length, radius in zip(lengths[1:], radii[1:], strict=True):
+        left = np.flatnonzero(~rods)
+        found = link_samples(np.ascontiguousarray(points[left]), radius, length, spacing)
+        rods[left[_rods_at(length, found, len(left), asked)]] = True
+    if len(lengths) > 1 and rods.any():
+        rods |= pieces_of_rods(finest, rods, radii[0], asked.length)
+    return rods
+
+
+def _rods_at(length: float, found: Linked, points: int, asked: Asked) -> np.ndarray:
+    """Return which points (N,) bool belong to rods by their samples for a member length."""
+    return rod_points(found, points, length, support_samples(found, length) if asked.z_is_up else None)

@@ -16,7 +16,9 @@ from .equalize import FOUR_ROOT_3
 from .grid import Net, target_length, wings
 
 OFF_PATCH = 0.33  # distance of the middle of a triangle from the patches of its nodes at which it has left them [desired length]
-SQUARED_COSINE_OF_FOLD = 0.25  # square of the cosine of the angle between two triangles below which the member between them is folded
+SQUARED_COSINE_OF_FOLD = (
+    0.25  # square of the cosine of the angle between two triangles below which the member between them is folded
+)
 
 
 class Scratch(NamedTuple):

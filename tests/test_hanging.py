@@ -1,0 +1,59 @@
+"""A grid whose nodes hang on points off the surface fails; cliffs, horns and closed holes are none of that."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from small_clouds import sheet
+from test_places_to_look_at import NOTHING, lattice, scanned
+from typed import known
+
+import scantruss as st
+from scantruss.check.certify import certified, certify
+from scantruss.errors import CertificateError
+
+SETTINGS = st.Settings(length=1.0, ridge_angle=0.0)
+ROOF = sheet(13, 8, 0.03)
+
+
+def blob(x: float, y: float, z: float) -> np.ndarray:
+    """A few points close together, as of a pole under the roof."""
+    return np.array([x, y, z]) + 0.03 * np.random.default_rng(1).normal(size=(20, 3))
+
+
+def test_a_node_on_a_pole_under_the_roof_is_a_fault_with_its_place() -> None:
+    samples, grid = scanned(np.concatenate([ROOF, blob(0, 0, -0.8)]), lattice())
+    down = int(np.linalg.norm(grid.nodes + grid.origin, axis=1).argmin())
+    nodes = grid.nodes.copy()
+    nodes[down, 2] -= 0.8
+    whole = certify(grid, samples, NOTHING, SETTINGS)
+    assert not any(fault.kind == "hanging" for fault in whole.faults)
+    hanging = grid.replace(nodes=nodes)
+    (fault,) = (fault for fault in certify(hanging, samples, NOTHING, SETTINGS).faults if fault.kind == "hanging")
+    assert known(fault.where) == pytest.approx((0.0, 0.0, -0.8), abs=1e-9)
+    with pytest.raises(CertificateError, match=r"hangs on points off the surface.*--crop or --piece"):
+        certified(hanging, samples, NOTHING, SETTINGS)
+
+
+def test_a_pyramid_that_was_measured_is_none() -> None:
+    """Its members are as steep, but points lie along them."""
+    grid = lattice()
+    down = int(np.linalg.norm(grid.nodes, axis=1).argmin())
+    nodes = grid.nodes.copy()
+    nodes[down, 2] -= 0.8
+    grid = grid.replace(nodes=nodes)
+    weights = np.random.default_rng(2).dirichlet(np.ones(3), (len(grid.triangles), 250))
+    points = np.einsum("tpc,tcx->tpx", weights, nodes[grid.triangles]).reshape(-1, 3)
+    samples, grid = scanned(points, grid)
+    assert not any(fault.kind == "hanging" for fault in certify(grid, samples, NOTHING, SETTINGS).faults)
+
+
+def test_a_cliff_that_the_scanner_did_not_see_is_none() -> None:
+    """From its edge two members of six go down through empty space."""
+    points = ROOF.copy()
+    points[points[:, 0] > 0.2, 2] -= 0.7
+    grid = lattice()
+    nodes = grid.nodes.copy()
+    nodes[nodes[:, 0] > 0.2, 2] -= 0.7
+    samples, grid = scanned(points, grid.replace(nodes=nodes))
+    assert not any(fault.kind == "hanging" for fault in certify(grid, samples, NOTHING, SETTINGS).faults)
