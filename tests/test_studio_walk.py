@@ -70,7 +70,7 @@ def test_progress_and_steps_stay_in_sight_and_draw_scan_as_set(tmp_path: Path) -
         ready(page, session)
         page.wait_for_timeout(500)
         assert field(page, "draw scan").is_checked()
-        assert until(lambda: session.cloud.unit == "cm" and session.grid is not None)
+        assert until(lambda: session.settings.unit == "cm" and session.grid is not None)
         assert field(page, "draw scan").is_checked()
         tab(page, "Structure")
         page.click("text=Sizing and modes")

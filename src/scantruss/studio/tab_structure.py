@@ -186,7 +186,7 @@ class StructureTab:
         lost, size = words_of_lost(state), state.structure_settings.size
         self.lost.content, self.lost.visible = f"**lost:** {lost}", bool(lost)
         chosen = f"chosen by sizing, at most {size}" if size else ""
-        self.sized.content, self.sized.visible = f"the section is {chosen}: {SIZING}", bool(size)
+        self.sized.content, self.sized.visible = f"the section is {chosen}; see below", bool(size)
         self.folder.label = f"{SIZING} (sections {chosen})" if size else SIZING
 
     def support(self, found: tuple[str, int] | None) -> None:
