@@ -58,7 +58,7 @@ def unfollowed_parts(
 
 
 def _followed_to(grid: Grid) -> np.ndarray:
-    """Return up to which distance from each triangle (T,) points are followed, noise aside: as far as a surface so bent [member lengths]."""
+    """Return up to which distance from each triangle (T,) points are followed, noise aside: as a surface so bent [member lengths]."""
     folds, bend = np.radians(180.0 - fold_angles(grid)), np.zeros(len(grid.triangles))
     for triangles in grid.edge_triangles.T:
         known = (triangles >= 0) & np.isfinite(folds)

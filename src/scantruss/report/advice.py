@@ -38,6 +38,7 @@ SHORTER_FIRST = (
     (1 / 1.4, A_FEW), (1.4, A_FEW), (1.0, SOME_MORE), (0.5, A_FEW), (2.0, A_FEW), (1 / 1.4, SOME_MORE), (1.4, SOME_MORE),
     (2.8, A_FEW), (2.0, SOME_MORE),
 )  # fmt: skip
+LAST_LENGTHS = (1.4, 2.0, 2.8)  # lengths that are tried where none has passed, as multiples of the usual one
 NEARLY_NEXT = 1.45  # ratio of lengths that pass up to which the longer one stands for the next to the shorter
 LINES_OF_A_SCANNER = 5  # fewest lines of points that may be those of a scanner
 NEXT_LENGTH = 1.4  # a length is suggested if that many times it passes too
@@ -212,7 +213,8 @@ class Advice:
 
         It is the first of those tried in turn that passes with what is next above it, both without much of the scan lost; else of
         those that pass with what is next above them the one that loses least; else the next below one that passes, if it passes too;
-        else one that passes, if there is one with another not far above it that passes too; else the usual length.
+        else one that passes, if there is one with another not far above it that passes too; else the usual length. Where none passes,
+        longer ones are looked at once more.
         """
         self.is_spent = True
         low, high = length_range(self._cloud)
@@ -233,6 +235,8 @@ class Advice:
                     return length
         if both:
             return min(both, key=lambda length: both[length])
+        if not self.passes:
+            self._try_longer()
         passing = [trial.length for trial in self.tried if trial.passed]
         if passing:
             below = self.next_below(passing[0])
@@ -242,6 +246,15 @@ class Advice:
                 return below
         followed = [one for one in passing if any(one < other <= NEARLY_NEXT * one for other in passing)]
         return min(followed or passing, key=self._far_from_usual, default=self._usual)
+
+    def _try_longer(self) -> None:
+        """Try longer lengths than the usual one, a few grids each, until one passes: columns are then seen for what they are."""
+        for share in LAST_LENGTHS:
+            length = min(_two_digits(share * self._usual), length_range(self._cloud)[1])
+            self._count_at(length, A_FEW)
+            trial = self.try_length(length, A_FEW)
+            if trial is not None and trial.passed:
+                return
 
     def _ladder(self) -> Iterator[tuple[float, int]]:
         """Yield the lengths to try in turn, as multiples of the usual one, with how many grids are made of each."""
