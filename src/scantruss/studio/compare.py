@@ -61,10 +61,11 @@ def grid_figures(grid: Grid) -> list[tuple[str, str]]:
     return [
         ("nodes", f"{len(grid.nodes):,}"),
         ("members", f"{len(grid.edges):,}"),
-        ("panels", f"{len(grid.triangles):,}"),
+        ("panels", f"{len(grid.panel_table):,} {grid.panels_are}"),
         ("member length, mean", f"{quality.length_mean:.4g}{unit}"),
         ("length std / mean (CV)", f"{quality.length_cv:.4f}"),
         ("shape quality G", f"{quality.shape_mean:.4f}"),
+        *(() if quality.planarity_max is None else (("farthest off its plane", f"{quality.planarity_max:.2%}"),)),
         ("members in all", f"{grid.lengths.sum():,.5g}{unit}"),
         ("node farthest from the scan", f"{offsets.max():.3g}{unit}" if len(offsets) else "-"),
     ]

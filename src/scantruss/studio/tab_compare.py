@@ -102,7 +102,7 @@ class CompareTab:
         legend = legend_of(f"{chosen.name}: {words}", chosen.grid.unit, low, high, False)
         self.view.legends.show("beside", legend)
         scene.lines("/beside/members", nodes[chosen.grid.edges], colors)
-        scene.panels("/beside/panels", nodes, chosen.grid.triangles, None, 0.25)
+        scene.panels("/beside/panels", nodes, chosen.grid.triangles, None, 0.25, chosen.grid.panel_table)
         scene.api.add_label("/beside/name", chosen.name, position=tuple((nodes.max(axis=0)).tolist()))
 
     @property

@@ -12,6 +12,7 @@ import numpy as np
 from ..export.formats import GRID, STRUCTURE
 from ..export.model import Model
 from ..export.page_tables import Tables, tables_of
+from ..grid.panels import panel_of_triangles
 from ..structure.build import scale_of
 from .colours import colorings_of_scan
 from .frame import BESIDE_FIRST, DRAWN_EXTENT, ROOM_AROUND, SceneFrame, distance_to_see
@@ -171,13 +172,11 @@ class StudioView(Presses):
         if (shown := self.shown_model()) is None:
             return None
         model, _ = shown
-        return pick(
-            self.places(model),
-            model.members,
-            model.triangles if self.look.panels.value else model.triangles[:0],
-            origin,
-            ahead,
-        )
+        triangles = model.triangles if self.look.panels.value else model.triangles[:0]
+        found = pick(self.places(model), model.members, triangles, origin, ahead)
+        if found is None or found[0] != "panels":
+            return found
+        return "panels", int(panel_of_triangles(model.panels)[found[1]])
 
     def select(self, kind: str, number: int) -> None:
         """Show the row of a node, member or panel in its schedule, and draw it in another colour."""
