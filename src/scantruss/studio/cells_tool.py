@@ -34,9 +34,14 @@ def changes_for_cells(settings: Settings, cells: str) -> dict[str, Any]:
 
 
 def words_of_panels(grid: Grid) -> str:
-    """Return how many panels a grid has and how far one is off its plane, where they are no triangles; else ""."""
+    """Return how many quads or hexagons a grid has; "" of triangles."""
+    return "" if grid.panels is None else f", {len(grid.panels):,} {grid.panels_are}"
+
+
+def words_of_planes(grid: Grid) -> str:
+    """Return how far a panel is off its plane at most, over its mean diagonal; "" of triangles."""
     off = grid.quality.planarity_max
-    return "" if off is None else f", {len(grid.panel_table):,} {grid.panels_are} within {off:.2%} of a plane"
+    return "" if off is None else f", off plane {off:.2%}"
 
 
 class CellsTool:

@@ -231,7 +231,9 @@ class Scene:
         import trimesh
 
         body = trimesh.Trimesh(corners, faces, process=False)
-        rgba = np.concatenate([np.repeat(lit(colors, PANEL_GAMMA)[owner], 3, axis=0), np.full((len(corners), 1), 255)], axis=1)
+        rgba = np.concatenate(
+            [np.repeat(lit(colors, PANEL_GAMMA)[owner], 3, axis=0), np.full((len(corners), 1), 255)], axis=1
+        )
         body.visual.vertex_colors = rgba.astype(np.uint8)
         self.api.add_mesh_trimesh(f"{name} coloured", body)
 

@@ -95,7 +95,9 @@ class Session(TradeSteps):
         progress("boundary", 0.0)
         try:
             watched = progress if live else WatchedProgress(progress, self._see_front)
-            own = {"effort": effort} | ({"planar": False} if live else {})  # which takes thrice the time of a quick grid
+            own = {"effort": effort} | (
+                {"planar": False} if live else {}
+            )  # which takes thrice the time of a quick grid
             grid = grid_from_cloud(cloud, settings.replace(**own), progress=watched)
         finally:
             self.front = None

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
 from ..settings.records import EFFORTS, PREFER
-from .cells_tool import CellsTool, words_of_panels
+from .cells_tool import CellsTool, words_of_panels, words_of_planes
 from .feature_list import FeatureList
 from .length_brush import LengthBrush
 from .rows_tool import RowsTool
@@ -84,9 +84,9 @@ class DesignTab:
         quality, certificate = grid.quality, grid.certificate
         quick = " (quick, not saved)" if state.is_live else ""
         self.figures.content = (
-            f"{len(grid.nodes):,} nodes, {len(grid.edges):,} members{quick}\n\n"
+            f"{len(grid.nodes):,} nodes, {len(grid.edges):,} members{words_of_panels(grid)}{quick}\n\n"
             f"length {quality.length_mean:.4g}{unit}, CV {quality.length_cv:.4f}, G {quality.shape_mean:.4f}"
-            f"{words_of_panels(grid)}"
+            f"{words_of_planes(grid)}"
         )
         if certificate is None:
             self.figures.content += f"\n\n{NO_WORDS}"
