@@ -23,6 +23,7 @@ from scantruss.check.folds import fold_angles
 from scantruss.check.irregular import count_irregular
 from scantruss.errors import CertificateError
 from scantruss.grid.certificate import Certificate
+from scantruss.studio.compare import grid_figures
 from scantruss.surface.samples import SurfaceSamples
 
 SETTINGS = st.Settings(length=1.0)
@@ -314,3 +315,14 @@ def test_a_lost_limb_is_a_fault_from_a_twentieth_of_the_scan_on(plate: np.ndarra
     assert [fault.kind for fault in found.faults] == (["cover"] if share > 0.05 else [])
     accepted = certify(grid, *scan, settings.replace(allow_missing=0.2))
     assert accepted.passed and accepted.widened == ("allow missing 0.2 instead of 0.05",)
+
+
+@pytest.mark.parametrize("method", ["default", "paper"])
+def test_the_distances_of_the_nodes_of_a_grid_are_those_of_its_certificate(method: str) -> None:
+    x, y = (each.ravel() for each in np.meshgrid(np.linspace(-6, 6, 40), np.linspace(-5, 5, 34)))
+    points = np.stack([x, y, 4 - 0.5 * np.abs(x)], axis=1)
+    grid = st.grid_from_points(points, st.Settings(length=1.5, method=method, effort="quick"))
+    assert grid.certificate is not None and grid.certificate.node_distance is not None and grid.deviation is not None
+    assert grid.quality.node_deviation_max == np.nanmax(grid.deviation)
+    assert grid.certificate.node_distance.largest.value == np.nanmax(grid.deviation)
+    assert dict(grid_figures(grid))["node farthest from the scan"] == f"{np.nanmax(grid.deviation):.3g}"

@@ -1,14 +1,20 @@
 """What a person draws on the scan in the studio: lines, arrows of rows, lengths by a brush."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
+from studio_dome import done, session_of_dome
 
 import scantruss as st
 from scantruss.boundary.find import find_boundary
+from scantruss.errors import LengthError
 from scantruss.front.orientation_field import STARTS_OF_EFFORTS, lattice_along, usual_starts
+from scantruss.pipeline import grid_from_cloud
 from scantruss.studio.drawn_lines import ScannedPoints, numbers_of, points_of
 from scantruss.studio.frame import DRAWN_EXTENT, SceneFrame
 from scantruss.studio.length_brush import MOST_PAINTED, painted, places_to_paint
+from scantruss.studio.session import Session
 from scantruss.studio.symmetry_tool import corners_of, ends_on, upright_plane
 from scantruss.surface.samples import sample_surface
 
@@ -128,3 +134,40 @@ def test_a_mirror_plane_is_dragged_by_its_ends_on_the_scan(dome: st.PointCloud) 
     assert ends_on(ScannedPoints.of(dome, SETTINGS).places, np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0]), 1.0) is None
     with pytest.raises(st.InputError, match="above each other"):
         upright_plane(middle, middle + [0.0, 0.0, 2.0])
+
+
+def test_a_painted_length_leaves_the_length_elsewhere_and_no_field_brings_it_back(tmp_path: Path) -> None:
+    session = session_of_dome(tmp_path, 6.0)
+    session.set_length(1.6)
+    done(session)
+    assert session.cloud is not None
+    at = ScannedPoints.of(session.cloud, session.settings).nearest(np.array([2.0, 2.0, 2.0]))
+    for length in (0.8, 0.6, 1.2):
+        session.paint(painted(session.cloud, session.settings, at, 1.5, length))
+        done(session)
+        assert session.state.main_length == pytest.approx(1.6) and session.settings.length == length
+    session.set_length(1.2)  # the painted one with it
+    done(session)
+    assert session.settings.length == pytest.approx(0.9) and session.state.main_length == pytest.approx(1.2)
+    again = Session()
+    again.open(tmp_path / "dome.scantruss")
+    assert again.state.main_length == session.state.main_length
+    session.unpaint()
+    done(session)
+    assert session.settings.length == pytest.approx(1.2) and not session.settings.length_field
+    assert session.grid is not None and abs(session.grid.lengths.mean() - 1.2) < 0.15
+    session.undo()
+    assert session.settings.length == pytest.approx(0.9) and session.settings.length_field
+
+
+def test_a_length_that_the_scan_cannot_have_is_refused_when_it_is_typed(tmp_path: Path) -> None:
+    session = session_of_dome(tmp_path, 6.0)
+    before, cloud = session.state, session.cloud
+    assert cloud is not None
+    for length in (60.0, 0.02):
+        with pytest.raises(LengthError) as typed:
+            session.set_length(length)
+        assert session.state is before
+        with pytest.raises(LengthError) as generated:
+            grid_from_cloud(cloud, session.settings.replace(length=length))
+        assert str(typed.value) == str(generated.value)

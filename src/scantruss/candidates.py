@@ -79,7 +79,7 @@ class Candidate:
     def end(self) -> None:
         """Make the whole certificate of the grid taken, and refuse it if it does not pass."""
         assert self.judged is not None
-        self.grid = passed_grid(self.judged.grid.replace(certificate=self.judged.whole_certificate()))
+        self.grid = passed_grid(self.judged.certified_grid())
 
     @property
     def is_poor(self) -> bool:

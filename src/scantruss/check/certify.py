@@ -80,6 +80,11 @@ class Judged:
         """The grid with the certificate as far as it goes."""
         return self.grid.replace(certificate=self.certificate)
 
+    def certified_grid(self) -> Grid:
+        """Return the grid with all that its certificate says, and the distances of its nodes of which that names the largest."""
+        away = self.grid.deviation if self.found is None else self.found.nodes
+        return self.grid.replace(certificate=self.whole_certificate(), deviation=away)
+
     def whole_certificate(self) -> Certificate:
         """Return the certificate with all that it says."""
         found, length = self.found, self.settings.length
@@ -132,8 +137,8 @@ def judge(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings: Set
 
 
 def checked(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings: Settings) -> Grid:
-    """Return the grid with its certificate, whether it passes or not."""
-    return grid.replace(certificate=certify(grid, samples, boundary, settings))
+    """Return the grid with its certificate and the distances of its nodes, whether it passes or not."""
+    return judge(grid, samples, boundary, settings).certified_grid()
 
 
 def certified(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings: Settings) -> Grid:

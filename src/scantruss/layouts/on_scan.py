@@ -8,7 +8,7 @@ import numpy as np
 
 from ..boundary.find import Boundary, find_boundary
 from ..cells.make import judging_settings, settings_of_triangles
-from ..check.certify import certify
+from ..check.certify import checked
 from ..check.distances import distances_to_points
 from ..grid.certificate import check_passed
 from ..grid.grid import Grid
@@ -43,11 +43,7 @@ class ScanOfGrid(NamedTuple):
         CertificateError
             It fails, and is not to be kept all the same.
         """
-        moved = self._at_scan(grid)
-        moved = moved.replace(
-            deviation=self.distances(moved),
-            certificate=certify(moved, self.samples, self.boundary, judging_settings(self.settings)),
-        )
+        moved = checked(self._at_scan(grid), self.samples, self.boundary, judging_settings(self.settings))
         check_passed(moved, keep_failed)
         return moved
 

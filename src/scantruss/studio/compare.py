@@ -57,7 +57,8 @@ def structure_figures(state: StudioState) -> list[tuple[str, str]]:
 def grid_figures(grid: Grid) -> list[tuple[str, str]]:
     """Return the figures of a grid, in words."""
     quality, unit = grid.quality, f" {grid.unit}" if grid.unit else ""
-    offsets = grid.deviation[np.isfinite(grid.deviation)] if grid.deviation is not None else np.zeros(0)
+    certificate = grid.certificate
+    away = None if certificate is None else certificate.node_distance
     return [
         ("nodes", f"{len(grid.nodes):,}"),
         ("members", f"{len(grid.edges):,}"),
@@ -67,7 +68,7 @@ def grid_figures(grid: Grid) -> list[tuple[str, str]]:
         ("shape quality G", f"{quality.shape_mean:.4f}"),
         *(() if quality.planarity_max is None else (("farthest off its plane", f"{quality.planarity_max:.2%}"),)),
         ("members in all", f"{grid.lengths.sum():,.5g}{unit}"),
-        ("node farthest from the scan", f"{offsets.max():.3g}{unit}" if len(offsets) else "-"),
+        ("node farthest from the scan", "-" if away is None else f"{away.largest.value:.3g}{unit}"),
     ]
 
 

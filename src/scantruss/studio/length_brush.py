@@ -23,6 +23,10 @@ if TYPE_CHECKING:
 PAINT_MODE = "paint length"
 MOST_PAINTED = 1500  #: places at which a painted length is kept
 PAINTED_SIZE = 0.14  #: of such a place that is drawn [scene]
+USUAL_SHARE, USUAL_RADIUS = (
+    0.5,
+    4.0,
+)  #: of a dab where none is typed: its length, its radius [length where none is painted]
 UNSEEN = 0.01  #: opacity of the surface on which pointers are followed
 PLACE_DIGITS = 8  #: significant ones of a coordinate
 
@@ -79,11 +83,16 @@ class LengthBrush:
         paint = gui.add_button(
             "Paint", hint="then click on the scan, or drag over the grid: each place gets a round dab"
         )
-        self.length = gui.add_text("length there", "", hint="in the unit of the scan; empty: half of the length above")
-        self.radius = gui.add_text("radius", "", hint="of a dab, in the unit of the scan; empty: 4 members")
+        self.length = gui.add_text(
+            "length there", "", hint=f"in the unit of the scan; empty: {USUAL_SHARE:g} of the length above"
+        )
+        self.radius = gui.add_text(
+            "radius", "", hint=f"of a dab, in the unit of the scan; empty: {USUAL_RADIUS:g} members"
+        )
+        self.usual = gui.add_markdown("")
         none = gui.add_button("No field", hint="one length everywhere")
         paint.on_click(view.step(lambda: setattr(view.click, "value", PAINT_MODE)))
-        none.on_click(view.step(lambda: view.session.set("no length field", length_field="")))
+        none.on_click(view.step(view.session.unpaint))
         view.modes[PAINT_MODE] = self._click
         self._stroke: Settings | None = None  # while it is dragged
         self._surface: Any = None  # an unseen one, for pointers are followed on bodies only
@@ -100,16 +109,16 @@ class LengthBrush:
 
     def _dabbed(self, settings: Settings, place: np.ndarray) -> Settings:
         """Return settings with a dab at a place of the scan (3,)."""
-        cloud, field, usual = self.view.session.cloud, settings.length_field, settings.length
+        cloud, main = self.view.session.cloud, self.view.session.state.main_length
         assert cloud is not None
-        if field and not isinstance(field, str):
-            rows = [row[3] for row in field]
-            usual *= max(rows) / min(rows)
-        radius, length = self._number(self.radius, 4.0 * usual), self._number(self.length, 0.5 * usual)
+        radius, length = (
+            self._number(self.radius, USUAL_RADIUS * main),
+            self._number(self.length, USUAL_SHARE * main),
+        )
         return painted(cloud, settings, place, radius, length)
 
     def _finish(self, made: Settings) -> None:
-        self.view.session.set("paint", length=made.length, length_field=made.length_field, rows_along=())
+        self.view.session.paint(made)
 
     # ---- dragging
 
@@ -152,6 +161,8 @@ class LengthBrush:
         if before is None or before.grid is not state.grid:
             self._show_surface()
         field, settings = state.settings.length_field, state.settings
+        main, unit = state.main_length, f" {state.cloud.unit}" if state.cloud is not None and state.cloud.unit else ""
+        self.usual.content = f"empty: length {USUAL_SHARE * main:.4g}, radius {USUAL_RADIUS * main:.4g}{unit}"
         same = (
             before is not None and before.settings.length_field == field and before.settings.length == settings.length
         )

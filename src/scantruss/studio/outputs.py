@@ -17,6 +17,7 @@ from .project import save_project
 from .state import StudioState
 
 TAKEN = "taken.ply"  # the points that are taken, where some were removed by hand
+PREVIEW_WORDS = "this is the quick preview; press **Generate** for the final grid"
 CLEANED = "clean.ply"  # the scan without the points that were removed
 
 

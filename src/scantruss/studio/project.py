@@ -25,6 +25,7 @@ from ..structure.results import Solution
 from .project_trade import TRADE_BEFORE, TRADE_HEAD, TRADE_NODES, head_of_trade, nodes_of_trade, trade_of_parts
 from .scan_parts import Cleaning, WholeScan, part_of_scan, taken_of_scan
 from .state import Design, StudioState, Trade
+from .support_places import placed
 
 PROJECT_FORMAT, PROJECT_VERSION = "scantruss-project", 5
 CLEANING_OF_PART = 3  #: last version in which a cleaning named the points of the part that was taken
@@ -55,6 +56,8 @@ def save_project(path: Path, state: StudioState) -> None:
         "settings": state.settings.to_dict(), "solved": solved, "quick": state.is_live,
         "asked": None if state.asked is None else state.asked.to_dict(),
         "tape": [list(end) for end in state.tape],
+        "unpainted": state.unpainted,
+        "support_places": [[mark, list(place)] for mark, place in state.support_places],
         "designs": [{"name": each.name, "figures": [list(row) for row in each.figures]} for each in state.designs],
     }  # fmt: skip
     parts = {
@@ -168,14 +171,18 @@ def _project_of(parts: dict[str, bytes]) -> tuple[StudioState, bool]:
         of_part = tuple(map(str, numbers[2])) if len(numbers) > 2 else settings.crop
         cleaning = Cleaning(float(numbers[0]), float(numbers[1]), removes, crop=of_part)
     removed = _bits(parts["by_hand.npy"], len(cloud.points)) if "by_hand.npy" in parts else None
+    structure_settings = _structure_settings_of(parts["structure.toml"])
+    known = tuple((str(mark), (float(x), float(y), float(z))) for mark, (x, y, z) in head.get("support_places", ()))
     state = StudioState(
         cloud=part_of_scan(whole, settings, cleaning, removed),
         settings=settings,
+        unpainted=float(head.get("unpainted", 1.0)),
         grid=grid,
         asked=None if asked is None else Settings.from_dict(asked),
         trade=trade_of_parts(parts, grid, _grid_of),
         is_live=bool(head.get("quick", False)) and grid is not None,
-        structure_settings=_structure_settings_of(parts["structure.toml"]),
+        structure_settings=structure_settings,
+        support_places=placed(structure_settings.supports, known, grid),
         solved_with=_structure_settings_of(parts["solved.toml"]) if "solved.toml" in parts else None,
         designs=tuple(
             Design(each["name"], _grid_of(parts[f"design-{k}.json"]), tuple((a, b) for a, b in each["figures"]))

@@ -21,6 +21,7 @@ from .scan_parts import Cleaning, WholeScan, cleaning_of, part_of_scan
 from .solving import solved_again
 from .state import StudioState
 from .steps import Steps
+from .support_places import for_new_scan
 
 LARGEST_UPLOAD = 500_000_000  #: of a scan that comes through the page [bytes]
 TOO_LARGE = f"a scan of more than {LARGEST_UPLOAD:,} bytes; name it on the command line: scantruss studio SCAN"
@@ -135,8 +136,9 @@ class ScanSteps(Steps):
         cloud = whole.cloud
         made = settings or Settings(length=suggest_length(cloud), unit=cloud.unit)
         state = replace(
-            self.state, whole=whole, cloud=cloud, cleaning=None, removed=None, tape=(), settings=made, **NO_GRID
-        )
+            self.state, whole=whole, cloud=cloud, cleaning=None, removed=None, tape=(), settings=made, unpainted=1.0,
+            structure_settings=for_new_scan(self.state.structure_settings), solved_with=None, support_places=(), **NO_GRID,
+        )  # fmt: skip
         number, place = self._place_for(cloud.name or "scan")
         self._open_state(f"open {cloud.name}", state, number, place)
 

@@ -15,7 +15,7 @@ from ..export.model import Model
 from ..pipeline import grid_from_cloud
 from ..runtime.progress import Progress, WatchedProgress
 from ..scan.cloud import PointCloud
-from ..scan.member_length import exact_range
+from ..scan.member_length import check_length, exact_range
 from ..settings import Settings
 from ..structure.options import loads_of_words
 from ..surface.samples import sample_surface
@@ -24,6 +24,7 @@ from .features import Feature, find_features, switched_off
 from .outputs import command_of, files_of, model_to_show
 from .scan_steps import NO_GRID
 from .solving import check_words, solved_state
+from .support_places import placed, supports_on
 from .trade_steps import TradeSteps
 
 SECONDS_OF_FRONT = 0.2  #: between two pictures of a front [s]
@@ -59,6 +60,9 @@ class Session(TradeSteps):
         if settings == self.settings and self.grid is not None:
             return
         self.change(words, settings=settings)
+        self._show_change()
+
+    def _show_change(self) -> None:
         self.save()
         self.tell()
         self._ask_live()
@@ -69,9 +73,35 @@ class Session(TradeSteps):
         self.save()
         self.tell()
 
+    def set_length(self, length: float) -> None:
+        """Take a length of members, and show a quick grid with it.
+
+        Raises
+        ------
+        InputError
+            No grid of this scan can have it.
+        """
+        settings = self.state.with_main_length(length)
+        if self.cloud is not None:
+            check_length(self.cloud, settings)
+        self.set("length", length=settings.length)
+
+    def paint(self, made: Settings) -> None:
+        """Take settings with other lengths at some places; the length elsewhere stays."""
+        main = self.state.main_length
+        self.change("paint", settings=made, unpainted=main / made.length)
+        self._show_change()
+
+    def unpaint(self) -> None:
+        """Take one length everywhere: that of where none was painted."""
+        settings = self.settings.replace(length=self.state.main_length, length_field="")
+        if settings != self.settings:
+            self.change("no length field", settings=settings, unpainted=1.0)
+            self._show_change()
+
     def live(self, length: float) -> bool:
         """Make a quick grid of a length, unless a run that was asked for is under way; the newest request wins."""
-        self.change("slider", goes_on=True, settings=self.settings.replace(length=length))
+        self.change("slider", goes_on=True, settings=self.state.with_main_length(length))
         return self._ask_live()
 
     def show_quick(self) -> bool:
@@ -105,6 +135,7 @@ class Session(TradeSteps):
         with self._lock:
             if turn != self._turn or (live and len(grid.edges) > MOST_LIVE_MEMBERS):
                 return
+            made |= supports_on(self.state, grid)
             if live:
                 self.state = replace(self.state, **made)
             else:
@@ -185,7 +216,8 @@ class Session(TradeSteps):
             given["loads"] = loads_of_words(str(given["loads"]))
         settings = self.state.structure_settings.replace(**given)
         if settings != self.state.structure_settings:
-            self.change("structure", structure_settings=settings)
+            places = placed(settings.supports, self.state.support_places, self.grid)
+            self.change("structure", structure_settings=settings, support_places=places)
             self.save()
 
     def run_structure(self) -> None:

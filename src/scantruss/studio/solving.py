@@ -15,6 +15,7 @@ from ..structure.statics import factor_stiffness, solve
 from ..structure.truss import Truss
 from ..structure.variants import truss_arguments
 from .state import StudioState
+from .support_places import check_none_is_lost
 
 
 def check_words(words: Mapping[str, str]) -> None:
@@ -47,6 +48,7 @@ def solved_state(state: StudioState, progress: Progress = _silent) -> StudioStat
     """
     if state.grid is None:
         raise InputError("there is no grid yet; press Generate")
+    check_none_is_lost(state)
     asked = state.structure_settings
     if not (state.grid.unit or asked.unit):
         raise InputError(

@@ -55,7 +55,7 @@ class DesignTab:
             length = float(self.length.value)
         except ValueError:
             raise InputError(f"length needs a number, got {self.length.value!r}") from None
-        self.view.session.set("length", length=length)
+        self.view.session.set_length(length)
 
     def fill(self, before: StudioState | None, state: StudioState) -> None:
         """Show a state."""
@@ -65,10 +65,12 @@ class DesignTab:
             step = float(f"{(high - low) / SLIDER_STEPS or 1.0:.1g}")
             set_scale(self.slider, low, max(high, low + step), step)
         if before is None or before.settings is not settings or before.cloud is not cloud:
-            if abs(self.slider.value - settings.length) > 1e-9 * settings.length:
-                self.slider.value = min(max(settings.length, self.slider.min), self.slider.max)
-            self.view.show_text(self.length, f"{settings.length:g}")
+            length = float(f"{state.main_length:.9g}")
+            if abs(self.slider.value - length) > 1e-9 * length:
+                self.slider.value = min(max(length, self.slider.min), self.slider.max)
             self.effort.value, self.prefer.value = settings.effort, settings.prefer
+        if not session.message:  # else what was refused stands there
+            self.view.show_text(self.length, f"{float(f'{state.main_length:.9g}'):g}")
         if before is None or before.grid is not state.grid or before.is_live != state.is_live:
             self._fill_grid(state)
         for part in (self.cells, self.features, self.rows, self.brush, self.trade):

@@ -4,18 +4,23 @@ from __future__ import annotations
 
 import contextlib
 import time
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import InputError
 from ..structure.groups import WAYS_TO_GROUP
+from ..structure.options import loads_of_words
 from ..structure.supports import HELD
 from .colours import colors_of, legend_of
 from .compare import structure_figures
 from .frame import DRAWN_EXTENT
+from .outputs import PREVIEW_WORDS
+from .page_words import in_words_of_page
 from .scene import barbed, spread
 from .session import STRUCTURE_WORDS
+from .support_places import marks_of, switched, words_of_lost
 
 if TYPE_CHECKING:
     from .state import StudioState
@@ -32,6 +37,8 @@ ANIMATION_SECONDS, FRAME_SECONDS = 6.0, 0.08  #: of a mode that is shown [s]
 SWINGS = 3  #: of a mode while it is shown
 AS_BUILT = "as built"
 SUPPORT_MODE = "support"
+SIZING = "Sizing and modes"
+CHOSEN = ("support_type", "size_by")  #: what is chosen from a list
 
 
 def scale_of_text(text: str) -> float:
@@ -62,6 +69,12 @@ def times_of(factor: float) -> str:
     return f"{float(f'{factor:.3g}'):,.0f}" if factor >= 100 else f"{factor:.3g}"
 
 
+def words_of_asked(state: StudioState) -> str:
+    """Return how the structure that is shown is supported, of what it is made and what it carries."""
+    shown = state.shown_structure
+    return f"supports {shown.supports}, {shown.section}, {shown.material}, {','.join(map(str, shown.loads))}"
+
+
 class StructureTab:
     """The structure of the grid and its results."""
 
@@ -71,15 +84,21 @@ class StructureTab:
         hint = (
             "corners, boundary, lowest:H, fixed, ends, line:NAME, loop:N, N001, joined by +; or set a click to support"
         )
-        self.words = {
-            "supports": gui.add_text("supports", kept.supports, hint=hint),
+        self.preview = gui.add_markdown(PREVIEW_WORDS, visible=False)
+        self.words = {"supports": gui.add_text("supports", kept.supports, hint=hint)}
+        self.lost = gui.add_markdown("", visible=False)
+        self.words |= {
             "support_type": gui.add_dropdown("held as", tuple(HELD), initial_value=kept.support_type),
             "section": gui.add_text("section", kept.section),
+        }
+        self.sized = gui.add_markdown("", visible=False)
+        self.words |= {
             "material": gui.add_text("material", kept.material),
             "loads": gui.add_text("loads", ",".join(map(str, kept.loads)), hint="self,snow:1kN/m2,wind:0.8kN/m2:-0.7"),
         }
         self.numbers = {"scale": gui.add_text("scale", f"{kept.scale:g}", hint="of the structure to the grid")}
-        with gui.add_folder("Sizing and modes", expand_by_default=False):
+        self.folder = gui.add_folder(SIZING, expand_by_default=False)
+        with self.folder:
             self.numbers["size"] = gui.add_text(
                 "size", str(kept.size), hint="different sections that are chosen at most; 0: as above"
             )
@@ -104,6 +123,12 @@ class StructureTab:
         view.modes[SUPPORT_MODE] = lambda origin, ahead: self.support(view.under(origin, ahead))
         for each in (self.factor, self.loads, self.supports):
             each.on_update(view.step(self.draw))
+        for name, each in (self.words | self.numbers).items():
+            take = partial(self._take, name)
+            if name in CHOSEN:
+                each.on_update(view.step(take))
+            else:
+                view.typed(each, take)
 
     @property
     def is_moved(self) -> bool:
@@ -119,15 +144,49 @@ class StructureTab:
         self.view.look.draw()
 
     def _run(self) -> None:
-        numbers: dict[str, float] = {}
-        for name, each in self.numbers.items():
-            try:
-                numbers[name] = scale_of_text(each.value) if name == "scale" else int(each.value)
-            except ValueError:
-                needs = "a number or 1:100" if name == "scale" else "a whole number"
-                raise InputError(f"{each.label} needs {needs}, got {each.value!r}") from None
-        self.view.session.set_structure(**{name: each.value for name, each in self.words.items()}, **numbers)
+        self.view.session.set_structure(**{name: self._value(name) for name in (*self.words, *self.numbers)})
         self.view.session.run_structure()
+
+    def _take(self, name: str) -> None:
+        self.view.session.set_structure(**{name: self._value(name)})
+        self.view.session.tell()
+
+    def _value(self, name: str) -> Any:
+        """Return what a field says."""
+        if name in self.words:
+            return self.words[name].value
+        each = self.numbers[name]
+        try:
+            return scale_of_text(each.value) if name == "scale" else int(each.value)
+        except ValueError:
+            needs = "a number or 1:100" if name == "scale" else "a whole number"
+            raise InputError(f"{each.label} needs {needs}, got {each.value!r}") from None
+
+    def _show_asked(self, state: StudioState) -> None:
+        """Show what the next structure is asked for; a field that says it in other words is left alone."""
+        asked = state.structure_settings
+        for name in STRUCTURE_WORDS:
+            value = getattr(asked, name)
+            if name in CHOSEN:
+                self.words[name].value = value
+            elif name != "loads":
+                self.view.show_text(self.words[name], value)
+            elif loads_of_words(self.words[name].value) != value:
+                self.view.show_text(self.words[name], ",".join(map(str, value)))
+        for name, each in self.numbers.items():
+            with contextlib.suppress(InputError):
+                if self._value(name) == getattr(asked, name):
+                    continue
+            self.view.show_text(each, f"{getattr(asked, name):g}")
+
+    def _show_notes(self, state: StudioState) -> None:
+        """Say what a person must know of the grid, the supports and the section before Run is pressed."""
+        self.preview.visible = state.is_live
+        lost, size = words_of_lost(state), state.structure_settings.size
+        self.lost.content, self.lost.visible = f"**lost:** {lost}", bool(lost)
+        chosen = f"chosen by sizing, at most {size}" if size else ""
+        self.sized.content, self.sized.visible = f"the section is {chosen}: {SIZING}", bool(size)
+        self.folder.label = f"{SIZING} (sections {chosen})" if size else SIZING
 
     def support(self, found: tuple[str, int] | None) -> None:
         """Hold the node under a click, or no longer."""
@@ -135,13 +194,12 @@ class StructureTab:
         if shown is None or found is None or found[0] != "nodes":
             raise InputError("no node is there; click on a node of the grid")
         mark = shown[0].node_marks[found[1]]
-        words = [word for word in self.words["supports"].value.split("+") if word.strip()]
-        marked = [word for word in words if word[:1] == "N" and word[1:].isdecimal()]
-        words = [word for word in marked if word != mark] if mark in marked else [*marked, mark]
-        self.words["supports"].value = "+".join(words)
-        self.view.session.set_structure(supports=self.words["supports"].value)
-        self.view.say(f"supports: {self.words['supports'].value or 'none'}; press Run")
-        self._mark_supports([shown[0].node_marks.index(word) for word in words], "/supports/chosen")
+        supports = switched(self.words["supports"].value, mark)
+        self.words["supports"].value = supports
+        self.view.session.set_structure(supports=supports)
+        self.view.say(f"supports: {supports or 'none'}; press Run")
+        marks = [word for word in marks_of(supports) if word in shown[0].node_marks]
+        self._mark_supports([shown[0].node_marks.index(word) for word in marks], "/supports/chosen")
 
     def _mark_supports(self, nodes: list[int], name: str) -> None:
         shown = self.view.shown_model()
@@ -151,18 +209,11 @@ class StructureTab:
     def fill(self, before: StudioState | None, state: StudioState) -> None:
         """Show the structure of a state."""
         if before is not None and before.structure_settings is not state.structure_settings:
-            asked = state.structure_settings
-            for name in STRUCTURE_WORDS:
-                value = getattr(asked, name)
-                self.words[name].value = ",".join(map(str, value)) if name == "loads" else value
-            for name, each in self.numbers.items():
-                each.value = f"{getattr(asked, name):g}"
+            self._show_asked(state)
+        self._show_notes(state)
+        self._show_results(state)
         if before is not None and before.solution is state.solution and before.grid is state.grid:
             return
-        rows = [f"{name} **{value}**" for name, value in structure_figures(state)]
-        if state.report is not None:
-            rows += [f"**warning:** {words}" for words in state.report.warnings]
-        self.results.content = "\n\n".join(rows)
         weights = state.report.weights if state.report is not None else None
         self.weights.content = weight_bars(weights) if weights else ""
         cases: tuple[str, ...] = (AS_BUILT,)
@@ -172,6 +223,13 @@ class StructureTab:
         self.case.options = cases
         self.view.scene.remove("/supports/chosen")
         self._draw(state)
+
+    def _show_results(self, state: StudioState) -> None:
+        rows = [f"**before the last change**, {words_of_asked(state)}:"] if state.is_structure_stale else []
+        rows += [f"{name} **{value}**" for name, value in structure_figures(state)]
+        if state.report is not None:
+            rows += [f"**warning:** {in_words_of_page(words)}" for words in state.report.warnings]
+        self.results.content = "\n\n".join(rows)
 
     def _shapes(self, state: StudioState) -> dict[str, np.ndarray]:
         """Return the shapes (V, 3) of buckling and vibration by their names."""

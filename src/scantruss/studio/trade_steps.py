@@ -14,6 +14,7 @@ from ..layouts.trade import COUNTS, Traded, traded_kinds, traded_lengths
 from ..runtime.progress import Progress
 from .scan_steps import ScanSteps
 from .state import Trade
+from .support_places import supports_on
 
 FOUND_SHARE = 0.9  #: of the progress of a trade of kinds, when they have been found
 
@@ -103,7 +104,8 @@ class TradeSteps(ScanSteps):
                 if turn != self._turn:
                     return
                 words = f"{chosen.number} {trade.parts if trade.parts == LENGTHS else f'kinds of {trade.parts}'}"
-                self.change(words, grid=grid, is_live=False, solution=None, report=None)
+                supports = supports_on(self.state, grid)
+                self.change(words, grid=grid, is_live=False, solution=None, report=None, **supports)
             self.save()
 
         self.worker.ask(take)

@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from ..errors import ScanTrussError, words_of_error
 from ..runtime.progress import Progress
+from .page_words import in_words_of_page
 
 Task = Callable[[Progress], None]
 
@@ -107,9 +108,9 @@ class Worker:
 
 
 def words_of(error: Exception) -> str:
-    """Return an error in the words of the command line."""
+    """Return an error in the words of the page, which are those of the command line but for names of options."""
     if isinstance(error, ScanTrussError):
-        return " ".join(words_of_error(error).split())
+        return in_words_of_page(" ".join(words_of_error(error).split()))
     if isinstance(error, MemoryError):
         return "not enough memory; use fewer points or a larger length"
     if isinstance(error, OSError):
