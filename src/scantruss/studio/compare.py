@@ -9,6 +9,7 @@ import numpy as np
 from ..check.distances import distances_to_grid
 from ..errors import InputError, words_of_number
 from ..grid.grid import Grid
+from .layers_tool import figures_of_layers
 from .state import Design, StudioState
 
 LONGEST_NAME = 40  #: of a design [letters]
@@ -45,6 +46,7 @@ def structure_figures(state: StudioState) -> list[tuple[str, str]]:
         ("axial forces", f"{values['force_min'] / 1e3:.4g} to {values['force_max'] / 1e3:.4g} kN"),
         ("mass without nodes", f"{report.truss.mass:,.0f} kg"),
     ]
+    rows += figures_of_layers(report.truss)
     if report.rounds:
         rows.append(("sections", " ".join(values["sections"])))
     if report.buckling is not None and len(report.buckling.values):

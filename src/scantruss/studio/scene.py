@@ -265,6 +265,11 @@ class Scene:
             self.chain("/selected/panel", places[model.panel_loops[number]], True, SELECTED_COLOR, WIDE)
 
 
+def is_layered(model: Model) -> bool:
+    """Whether a structure has layers below its panels, which must be seen through them."""
+    return model.truss is not None and model.truss.layers is not None
+
+
 def lit(colors: np.ndarray, gamma: float) -> np.ndarray:
     """Return the colours (N, 3) uint8 of bodies that look like some colours (N, 3) by daylight: the page takes theirs as light."""
     return np.rint(255.0 * (np.asarray(colors, float) / 255.0) ** gamma).astype(np.uint8)

@@ -23,6 +23,7 @@ from .scene import (
     TUBE_RADIUS,
     cut,
     drawn_colors,
+    is_layered,
     plain_colors,
 )
 
@@ -203,7 +204,7 @@ class GridTab:
             places,
             model.triangles[visible[panel_of_triangles(panels)]],
             None if of_panels is None else of_panels[visible],
-            0.35 if len(model.members) <= MOST_DRAWN_LINES else None,
+            0.35 if len(model.members) <= MOST_DRAWN_LINES or is_layered(model) else None,
             panels[visible],
         )
 

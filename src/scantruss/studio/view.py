@@ -21,7 +21,7 @@ from .legends import Legends
 from .outputs import model_to_show
 from .picking import NEAR_ENOUGH, pick
 from .presses import Presses
-from .scene import FIRST_POINTS, Scene
+from .scene import FIRST_POINTS, Scene, is_layered
 from .session import Session
 from .state import StudioState
 from .style import PANEL_STYLE
@@ -173,7 +173,10 @@ class StudioView(Presses):
             return None
         model, _ = shown
         triangles = model.triangles if self.look.panels.value else model.triangles[:0]
-        found = pick(self.places(model), model.members, triangles, origin, ahead)
+        found = None
+        if is_layered(model):  # its panels hide nothing
+            found = pick(self.places(model), model.members, triangles[:0], origin, ahead)
+        found = found or pick(self.places(model), model.members, triangles, origin, ahead)
         if found is None or found[0] != "panels":
             return found
         return "panels", int(panel_of_triangles(model.panels)[found[1]])
