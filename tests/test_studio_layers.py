@@ -1,4 +1,4 @@
-"""Double layers in the studio: asked for in fields, solved, seen through, kept, repeated by the command line, refused in words of the page."""
+"""Double layers in the studio: asked for in fields, solved, seen through, kept, repeated by the command line, refused."""
 
 from pathlib import Path
 from types import SimpleNamespace

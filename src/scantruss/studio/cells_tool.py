@@ -13,8 +13,6 @@ if TYPE_CHECKING:
     from .state import StudioState
     from .view import StudioView
 
-TRIANGLES, QUADS, _ = CELLS
-
 
 def changes_for_cells(settings: Settings, cells: str) -> dict[str, Any]:
     """Return the changes of settings that other cells need: what only the cells before could have goes with them.
@@ -24,12 +22,12 @@ def changes_for_cells(settings: Settings, cells: str) -> dict[str, Any]:
     InputError
         The arrow of the rows is of triangles only.
     """
-    if cells != TRIANGLES and settings.rows_along:
+    if cells != "triangle" and settings.rows_along:
         raise InputError("the arrow that gives rows their direction is for triangles; press No arrow first")
     return {
         "cells": cells,
-        "rows": settings.rows if cells == QUADS else ROW_GUIDES[0],
-        "planar": settings.planar and cells != TRIANGLES,
+        "rows": settings.rows if cells == "quad" else ROW_GUIDES[0],
+        "planar": settings.planar and cells != "triangle",
     }
 
 
@@ -78,4 +76,4 @@ class CellsTool:
 
     def _show(self, settings: Settings) -> None:
         self.cells.value, self.rows.value, self.planar.value = settings.cells, settings.rows, settings.planar
-        self.rows.visible, self.planar.visible = settings.cells == QUADS, settings.cells != TRIANGLES
+        self.rows.visible, self.planar.visible = settings.cells == "quad", settings.cells != "triangle"
