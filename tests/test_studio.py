@@ -3,8 +3,11 @@
 import asyncio
 import threading
 import time
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,6 +19,7 @@ from scantruss.runtime.progress import Progress
 from scantruss.studio.in_order import InOrder
 from scantruss.studio.project import read_project
 from scantruss.studio.session import Session
+from scantruss.studio.typed_fields import TypedFields
 from scantruss.studio.worker import Worker
 
 PATIENCE = 120.0
@@ -271,4 +275,33 @@ def test_an_event_that_fails_keeps_none_from_being_taken(capsys: pytest.CaptureF
 
     asyncio.run(events())
     assert taken.wait(PATIENCE) and "ZeroDivisionError" in capsys.readouterr().err
+    in_order.close()
+
+
+class Field:
+    """A text field of a page."""
+
+    def __init__(self, value: str) -> None:
+        self.value = value
+
+    def on_update(self, note: Callable[[Any], Any]) -> None:
+        """Keep what is called when somebody types."""
+        self.note = note
+
+
+def test_a_step_of_one_field_writes_over_nothing_that_waits_in_another() -> None:
+    in_order, fields, taken = InOrder(), (Field("0"), Field("0")), list[str]()
+
+    def do(step: Callable[[], None]) -> bool:
+        step()
+        for each in fields:  # as a page that shows its state again
+            typed.show(each, "0")
+        return True
+
+    typed = TypedFields(in_order, do)
+    for each in fields:
+        typed.on_typed(each, partial(lambda one: taken.append(one.value), each))
+        each.value = "6"
+        asyncio.run(each.note(SimpleNamespace(client=1)))
+    assert typed.take() and taken == ["6", "6"]
     in_order.close()

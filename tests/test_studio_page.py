@@ -195,12 +195,12 @@ def test_a_person_makes_a_grid_and_a_structure(served: tuple[str, Session], tmp_
         tab(page, "Design")
         page.focus("[role=slider]:visible")
         page.keyboard.press("ArrowRight")
-        page.wait_for_selector("text=(quick, not saved)")
+        page.wait_for_selector("text=(quick preview)")
         length = float(f"{1.1 * session.settings.length:.3g}")
         field(page, "exactly").fill(f"{length:g}")
         page.click("button:has-text('Generate')")  # at once
         page.wait_for_selector("text=undo: generate")
-        page.wait_for_selector("text=(quick, not saved)", state="detached")
+        page.wait_for_selector("text=(quick preview)", state="detached")
         assert session.grid is not None and session.grid.settings is not None
         assert session.settings.length == session.grid.settings.length == length
         page.wait_for_selector("text=certificate: passed")
@@ -526,7 +526,7 @@ def test_two_browsers_have_a_project_each(served: tuple[str, Session]) -> None:
         tab(other, "Design")
         other.focus("[role=slider]:visible")
         other.keyboard.press("ArrowRight")
-        other.wait_for_selector("text=(quick, not saved)")
+        other.wait_for_selector("text=(quick preview)")
         assert session.settings is before and session.grid is grid
         page.reload()
         page.wait_for_selector("text=dome.scantruss")

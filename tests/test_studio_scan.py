@@ -8,7 +8,8 @@ import pytest
 import scantruss as st
 from scantruss.cli.main import main
 from scantruss.scan.formats.reading import read_points
-from scantruss.selection import Selection
+from scantruss.selection import Selection, polygon_text
+from scantruss.studio.crop_tool import check_rings, crosses_itself
 from scantruss.studio.outputs import command_of
 from scantruss.studio.session import Session
 
@@ -105,3 +106,24 @@ def test_what_is_red_goes_and_the_command_line_does_the_same(
     session.crop(())  # begins anew
     assert session.state.cleaning is None and session.state.whole is not None
     assert session.cloud is session.state.whole.cloud
+
+
+@pytest.mark.parametrize(
+    ("corners", "crosses"),
+    [
+        ([(0, 0), (2, 0), (2, 2), (0, 2)], False),
+        ([(0, 0), (2, 2), (2, 0), (0, 2)], True),
+        ([(0, 0), (4, 0), (4, 3), (1, 3), (1, 2), (3, 2), (3, 1), (0, 1)], False),  # a hook
+        ([(0, 0), (4, 0), (4, 3), (1, 3), (1, -1)], True),
+        ([(0, 0), (1, 0), (0, 1)], False),
+    ],
+)
+def test_a_polygon_that_crosses_itself_is_told_from_others(corners: list[tuple[float, float]], crosses: bool) -> None:
+    assert crosses_itself(corners, closed=True) == crosses
+    assert crosses_itself(corners[::-1], closed=True) == crosses
+    assert not crosses_itself(corners[:3], closed=False)
+    if crosses:
+        with pytest.raises(st.InputError, match="crosses itself"):
+            check_rings(polygon_text([corners]))
+    else:
+        check_rings(polygon_text([corners]))

@@ -250,3 +250,31 @@ def test_a_fixed_node_off_the_scan_is_not_taken_and_blocks_no_other(roof: Sessio
     assert len(roof.settings.fixed) == 0
     roof.fix(((4997.0, 1.0, 3.6),))
     assert len(done(roof).settings.fixed) == 1
+
+
+def test_a_kept_design_is_taken_as_the_present_one(roof: Session, tmp_path: Path) -> None:
+    roof.generate()
+    done(roof)
+    first, asked = roof.grid, roof.settings
+    roof.keep_design("A")
+    roof.set_length(1.6)
+    done(roof)
+    roof.generate()
+    done(roof)
+    second = roof.grid
+    assert first is not None and second is not None and len(second.nodes) < len(first.nodes)
+    roof.keep_design("B")
+    again = Session()
+    again.open(tmp_path / "roof.scantruss")
+    for session in (roof, again):
+        session.take_design("A")
+        assert session.grid is not None and np.array_equal(session.grid.nodes, first.nodes)
+        assert session.settings == asked and not session.state.is_stale and not session.state.is_live
+        session.undo()
+        assert session.grid is not None and np.array_equal(session.grid.nodes, second.nodes)
+    with pytest.raises(st.InputError, match="no design is chosen"):
+        roof.take_design("C")
+    roof.crop(("box:4993,-6,5008,6",))
+    done(roof)
+    with pytest.raises(st.InputError, match="A was made of another scan or of another part"):
+        roof.take_design("A")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from html import escape
+from typing import Any
 
 import numpy as np
 
@@ -10,7 +11,8 @@ from ..check.distances import distances_to_grid
 from ..errors import InputError, words_of_number
 from ..grid.grid import Grid
 from .layers_tool import figures_of_layers
-from .state import Design, StudioState
+from .state import NO_GRID, Design, StudioState
+from .support_places import supports_on
 
 LONGEST_NAME = 40  #: of a design [letters]
 
@@ -28,7 +30,28 @@ def kept_design(state: StudioState, name: str) -> Design:
         raise InputError("there is no grid yet; press Generate")
     if not 0 < len(name) <= LONGEST_NAME:
         raise InputError(f"a design needs a name of 1 to {LONGEST_NAME} letters")
-    return Design(name, state.grid, tuple(structure_figures(state)))
+    return Design(
+        name, state.grid, tuple(structure_figures(state)), state.cloud, state.asked, state.unpainted, state.is_live
+    )
+
+
+def taken_design(state: StudioState, name: str) -> dict[str, Any]:
+    """Return the changes of a state by which a kept design is the present one.
+
+    Raises
+    ------
+    InputError
+        There is none of that name, or it is of another scan.
+    """
+    design = next((each for each in state.designs if each.name == name), None)
+    if design is None:
+        raise InputError('no design is chosen; choose one in "beside"')
+    if design.cloud is None or design.cloud is not state.cloud or design.asked is None:
+        raise InputError(
+            f"{name} was made of another scan or of another part of it; it can be compared, but not be taken"
+        )
+    made = {"grid": design.grid, "asked": design.asked, "settings": design.asked, "unpainted": design.unpainted}
+    return NO_GRID | made | {"is_live": design.is_live} | supports_on(state, design.grid)
 
 
 def structure_figures(state: StudioState) -> list[tuple[str, str]]:

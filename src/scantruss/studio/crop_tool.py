@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import InputError
-from ..selection import parts_of, polygon_text
+from ..selection import check_crop, parts_of, polygon_text
 from .picking import place_on_scan
 
 if TYPE_CHECKING:
@@ -20,6 +21,35 @@ OUTSIDE_COLOR = np.array((190, 190, 195), np.uint8)
 CROP_MODE = "corner of crop"
 BOX_EDGES = np.array([(0, 1), (0, 2), (0, 4), (1, 3), (1, 5), (2, 3), (2, 6), (3, 7), (4, 5), (4, 6), (5, 7), (6, 7)])
 CROP_WAYS = ("Box", "Polygon", "All")
+
+
+def crosses_itself(corners: Sequence[Sequence[float]], *, closed: bool) -> bool:
+    """Whether two sides of a polygon in plan cross, the one back to its first corner among them if it is closed."""
+    begin = np.array(corners, float).reshape(-1, 2)
+    begin, end = (begin, np.roll(begin, -1, axis=0)) if closed else (begin[:-1], begin[1:])
+
+    def side(places: np.ndarray) -> np.ndarray:
+        """On which side of each line (N,) each place (N,) lies, (N, N)."""
+        along, away = end - begin, places[None] - begin[:, None]
+        return np.asarray(np.sign(along[:, None, 0] * away[:, :, 1] - along[:, None, 1] * away[:, :, 0]))
+
+    apart = side(begin) * side(end) < 0  # the ends of each side lie on both sides of the line
+    return bool((apart & apart.T).any())
+
+
+def check_rings(part: str) -> None:
+    """Refuse a polygon that crosses itself, of which nobody knows what is inside.
+
+    Raises
+    ------
+    InputError
+        One of its rings does.
+    """
+    for ring in (ring for rings in parts_of(part)[1] for ring in rings):
+        if len(ring) % 2 == 0 and crosses_itself(np.reshape(ring, (-1, 2)).tolist(), closed=True):
+            raise InputError(
+                "the polygon crosses itself, so what is inside is not known; press Undo to drop its last corner, or Polygon to begin again"
+            )
 
 
 class CropTool:
@@ -51,7 +81,13 @@ class CropTool:
 
     def _take(self) -> None:
         self._check()
-        self.view.session.crop(tuple(self.words.value.split()))
+        parts = tuple(self.words.value.split())
+        if self._corners and len(self._corners) < 3:
+            raise InputError("a polygon needs three corners at least; click more of them")
+        for part in check_crop(parts):
+            if part.startswith("polygon:"):
+                check_rings(part)
+        self.view.session.crop(parts)
         self._clear()
 
     def _clear(self) -> None:
@@ -92,7 +128,7 @@ class CropTool:
         self.view.scene.lines("/crop", corners[BOX_EDGES], np.array(CROP_COLOR, np.uint8), 4.0)
         if tells:
             numbers = self.view.frame.from_scene(corners[[0, -1]]).ravel().tolist()
-            self.words.value = "box:" + ",".join(f"{number:.7g}" for number in numbers)
+            self.words.value = "box:" + ",".join(f"{number:.10g}" for number in numbers)
             self._show_outside()
 
     def _box_corners(self) -> np.ndarray:
@@ -125,7 +161,15 @@ class CropTool:
         self._show_outside()
         self.view.plan()
         self.view.click.value = CROP_MODE
-        self.view.say("click the corners of a polygon on the plan, then press Crop")
+        self.view.say("click the corners of a polygon on the plan, then press Crop; Undo drops the last corner")
+
+    def take_back(self) -> bool:
+        """Drop the last corner of a polygon that is being drawn; whether there was one."""
+        if self.view.click.value != CROP_MODE or not self._corners:
+            return False
+        self._corners.pop()
+        self._show_corners()
+        return True
 
     def _corner(self, origin: np.ndarray, ahead: np.ndarray) -> None:
         """Take the place under a click for a corner: on the scan, or beside it at its middle height."""
@@ -136,7 +180,20 @@ class CropTool:
                 raise InputError("no corner is there; look at the scan from above: press Polygon")
             at = origin - ahead * (origin[2] / ahead[2])
         x, y, _ = frame.from_scene(at).tolist()
-        self._corners.append((float(f"{x:.7g}"), float(f"{y:.7g}")))
+        corners = [*self._corners, (float(f"{x:.10g}"), float(f"{y:.10g}"))]
+        if crosses_itself(corners, closed=False):
+            raise InputError(
+                "to that corner the polygon would cross itself; click elsewhere, or press Undo to drop the last corner"
+            )
+        self._corners = corners
+        self._show_corners()
+
+    def _show_corners(self) -> None:
+        frame = self.view.frame
+        self.words.value = polygon_text([self._corners]) if len(self._corners) > 2 else ""
+        self.view.scene.remove("/crop")
+        if not self._corners:
+            return
         places = np.array([(*corner, frame.middle[2]) for corner in self._corners])
         height = float(frame.to_scene(self._whole())[:, 2].max())
         drawn = frame.to_scene(places)
@@ -145,8 +202,6 @@ class CropTool:
             self.view.scene.chain("/crop", drawn, len(drawn) > 2, CROP_COLOR, 4.0)
         else:
             self.view.scene.points("/crop", drawn, np.array(CROP_COLOR, np.uint8), 0.12)
-        if len(self._corners) > 2:
-            self.words.value = polygon_text([self._corners])
 
     def fill(self, before: StudioState | None, state: StudioState) -> None:
         """Show the crop of a state."""

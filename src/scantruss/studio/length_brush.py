@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 PAINT_MODE = "paint length"
 MOST_PAINTED = 1500  #: places at which a painted length is kept
 PAINTED_SIZE = 0.14  #: of such a place that is drawn [scene]
-USUAL_SHARE, USUAL_RADIUS = (
+DAB_LENGTH, DAB_RADIUS = (
     0.5,
     4.0,
 )  #: of a dab where none is typed: its length, its radius [length where none is painted]
@@ -84,10 +84,10 @@ class LengthBrush:
             "Paint", hint="then click on the scan, or drag over the grid: each place gets a round dab"
         )
         self.length = gui.add_text(
-            "length there", "", hint=f"in the unit of the scan; empty: {USUAL_SHARE:g} of the length above"
+            "length there", "", hint=f"in the unit of the scan; empty: {DAB_LENGTH:g} of the length above"
         )
         self.radius = gui.add_text(
-            "radius", "", hint=f"of a dab, in the unit of the scan; empty: {USUAL_RADIUS:g} members"
+            "radius", "", hint=f"of a dab, in the unit of the scan; empty: {DAB_RADIUS:g} members"
         )
         self.usual = gui.add_markdown("")
         none = gui.add_button("No field", hint="one length everywhere")
@@ -112,8 +112,8 @@ class LengthBrush:
         cloud, main = self.view.session.cloud, self.view.session.state.main_length
         assert cloud is not None
         radius, length = (
-            self._number(self.radius, USUAL_RADIUS * main),
-            self._number(self.length, USUAL_SHARE * main),
+            self._number(self.radius, DAB_RADIUS * main),
+            self._number(self.length, DAB_LENGTH * main),
         )
         return painted(cloud, settings, place, radius, length)
 
@@ -162,7 +162,7 @@ class LengthBrush:
             self._show_surface()
         field, settings = state.settings.length_field, state.settings
         main, unit = state.main_length, f" {state.cloud.unit}" if state.cloud is not None and state.cloud.unit else ""
-        self.usual.content = f"empty: length {USUAL_SHARE * main:.4g}, radius {USUAL_RADIUS * main:.4g}{unit}"
+        self.usual.content = f"empty: length {DAB_LENGTH * main:.4g}, radius {DAB_RADIUS * main:.4g}{unit}"
         same = (
             before is not None and before.settings.length_field == field and before.settings.length == settings.length
         )

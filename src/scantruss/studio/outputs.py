@@ -17,6 +17,7 @@ from .project import save_project
 from .state import StudioState
 
 TAKEN = "taken.ply"  # the points that are taken, where some were removed by hand
+EFFORT_OF_PREVIEW = "quick"
 PREVIEW_WORDS = "this is the quick preview; press **Generate** for the final grid"
 CLEANED = "clean.ply"  # the scan without the points that were removed
 
@@ -74,6 +75,8 @@ def project_file(state: StudioState, place: Path | None) -> dict[str, bytes]:
 def _of_the_file(state: StudioState) -> Settings:
     """Return the settings that make the grid from the file that is read: a cleaned one holds the chosen points only."""
     made = state.settings if state.grid is None or state.asked is None else state.asked
+    if state.is_live:
+        made = made.replace(effort=EFFORT_OF_PREVIEW)
     if state.removed is not None:
         return made.replace(classes=(), crop=())
     if state.cleaning is None:

@@ -58,7 +58,7 @@ def save_project(path: Path, state: StudioState) -> None:
         "tape": [list(end) for end in state.tape],
         "unpainted": state.unpainted,
         "support_places": [[mark, list(place)] for mark, place in state.support_places],
-        "designs": [{"name": each.name, "figures": [list(row) for row in each.figures]} for each in state.designs],
+        "designs": [_head_of_design(each, state) for each in state.designs],
     }  # fmt: skip
     parts = {
         "made_by.npy": _npy(np.array(MARK)),
@@ -92,6 +92,28 @@ _SCANS: weakref.WeakKeyDictionary[WholeScan, bytes] = weakref.WeakKeyDictionary(
 _GRIDS: weakref.WeakKeyDictionary[Grid, bytes] = weakref.WeakKeyDictionary()
 _STRUCTURES: weakref.WeakKeyDictionary[Solution, bytes] = weakref.WeakKeyDictionary()
 _TRADES: weakref.WeakKeyDictionary[Trade, bytes] = weakref.WeakKeyDictionary()
+
+
+def _head_of_design(design: Design, state: StudioState) -> dict[str, Any]:
+    """Return all of a design but its grid."""
+    return {
+        "name": design.name, "figures": [list(row) for row in design.figures], "of_scan": design.cloud is state.cloud,
+        "asked": None if design.asked is None else design.asked.to_dict(), "unpainted": design.unpainted,
+        "quick": design.is_live,
+    }  # fmt: skip
+
+
+def _design_of(head: dict[str, Any], grid: Grid, cloud: PointCloud) -> Design:
+    asked = head.get("asked")
+    return Design(
+        head["name"],
+        grid,
+        tuple((a, b) for a, b in head["figures"]),
+        cloud if head.get("of_scan", False) else None,
+        None if asked is None else Settings.from_dict(asked),
+        float(head.get("unpainted", 1.0)),
+        bool(head.get("quick", False)),
+    )
 
 
 def _kept(known: weakref.WeakKeyDictionary[Part, bytes], part: Part, encode: Callable[[Part], bytes]) -> bytes:
@@ -173,8 +195,9 @@ def _project_of(parts: dict[str, bytes]) -> tuple[StudioState, bool]:
     removed = _bits(parts["by_hand.npy"], len(cloud.points)) if "by_hand.npy" in parts else None
     structure_settings = _structure_settings_of(parts["structure.toml"])
     known = tuple((str(mark), (float(x), float(y), float(z))) for mark, (x, y, z) in head.get("support_places", ()))
+    part = part_of_scan(whole, settings, cleaning, removed)
     state = StudioState(
-        cloud=part_of_scan(whole, settings, cleaning, removed),
+        cloud=part,
         settings=settings,
         unpainted=float(head.get("unpainted", 1.0)),
         grid=grid,
@@ -185,7 +208,7 @@ def _project_of(parts: dict[str, bytes]) -> tuple[StudioState, bool]:
         support_places=placed(structure_settings.supports, known, grid),
         solved_with=_structure_settings_of(parts["solved.toml"]) if "solved.toml" in parts else None,
         designs=tuple(
-            Design(each["name"], _grid_of(parts[f"design-{k}.json"]), tuple((a, b) for a, b in each["figures"]))
+            _design_of(each, _grid_of(parts[f"design-{k}.json"]), part)
             for k, each in enumerate(head.get("designs", ()), 1)
         ),
         whole=whole,

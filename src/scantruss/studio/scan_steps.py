@@ -5,7 +5,6 @@ from __future__ import annotations
 from abc import abstractmethod
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -19,16 +18,12 @@ from .opening import DATA_FOLDER, EXAMPLES, called, marks_of, next_free, read_wh
 from .project import read_project
 from .scan_parts import Cleaning, WholeScan, cleaning_of, part_of_scan
 from .solving import solved_again
-from .state import StudioState
+from .state import NO_GRID, StudioState
 from .steps import Steps
 from .support_places import for_new_scan
 
 LARGEST_UPLOAD = 500_000_000  #: of a scan that comes through the page [bytes]
 TOO_LARGE = f"a scan of more than {LARGEST_UPLOAD:,} bytes; name it on the command line: scantruss studio SCAN"
-NO_GRID: dict[str, Any] = {
-    "grid": None, "trade": None, "asked": None, "is_live": False, "solution": None, "report": None
-}  # fmt: skip
-"""Changes of a scan that is another now."""
 
 
 class ScanSteps(Steps):

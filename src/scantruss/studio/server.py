@@ -27,7 +27,11 @@ SOMEWHERE = {
 }  #: addresses of examples (RFC 5737, 3849), by what listens everywhere
 COOKIE = "scantruss_studio"
 BROWSER_KEY = "scantruss_browser"
-PAGE_SCRIPTS = tuple(Path(__file__).with_name(name) for name in ("page_script.js", "page_keys.js", "page_presses.js"))
+PAGE_SCRIPTS = tuple(
+    Path(__file__).with_name(name)
+    for name in ("page_script.js", "page_keys.js", "page_presses.js", "page_connection.js")
+)
+ALIVE = "/alive"  #: what a page asks for to know that the server is there
 STORAGE_PATIENCE = 5.0  #: how long a browser may take to say who it is [s]
 Handler = Callable[[Any, Any], Any]
 
@@ -111,6 +115,8 @@ class Guard:
             if words := self.refusal(request.path, request.headers):
                 head = Headers({"Content-Type": "text/plain; charset=utf-8", "Connection": "close"})
                 return Response(http.HTTPStatus.FORBIDDEN, "Forbidden", head, f"{words}\n".encode())
+            if urlsplit(request.path).path == ALIVE:
+                return Response(http.HTTPStatus.NO_CONTENT, "No Content", Headers({"Cache-Control": "no-store"}), b"")
             answer = inner(connection, request)
             if answer is not None:
                 if answer.headers.get("Content-Type", "").startswith("text/html"):

@@ -19,11 +19,11 @@ from ..scan.member_length import check_length, exact_range
 from ..settings import Settings
 from ..structure.options import loads_of_words
 from ..surface.samples import sample_surface
-from .compare import kept_design
+from .compare import kept_design, taken_design
 from .features import Feature, find_features, switched_off
-from .outputs import command_of, files_of, model_to_show
-from .scan_steps import NO_GRID
+from .outputs import EFFORT_OF_PREVIEW, command_of, files_of, model_to_show
 from .solving import check_words, solved_state
+from .state import NO_GRID
 from .support_places import placed, supports_on
 from .trade_steps import TradeSteps
 
@@ -109,7 +109,7 @@ class Session(TradeSteps):
         return self.cloud is not None and self.grid is None and self._ask_live()
 
     def _ask_live(self) -> bool:
-        return self.worker.ask(lambda progress: self._make("quick", progress, live=True), quick=True)
+        return self.worker.ask(lambda progress: self._make(EFFORT_OF_PREVIEW, progress, live=True), quick=True)
 
     def generate(self) -> None:
         """Make the grid with the effort of the settings."""
@@ -243,6 +243,18 @@ class Session(TradeSteps):
         self.change(f"keep {design.name}", designs=(*others, design))
         self.save()
         self.tell()
+
+    def take_design(self, name: str) -> None:
+        """Go on with a design that was kept."""
+        changes = taken_design(self.state, name)
+        if changes["grid"] is self.grid:
+            return
+        self.stop()
+        self._turn += 1
+        self.change(f"take {name}", **changes)
+        self.save()
+        self.tell()
+        self._look_for_features()
 
     def drop_design(self, name: str) -> None:
         """Forget a design."""

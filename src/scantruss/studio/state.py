@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -29,6 +30,10 @@ class Design:
     name: str
     grid: Grid
     figures: tuple[tuple[str, str], ...] = ()  #: of its structure, in words
+    cloud: PointCloud | None = None  #: of which it was made; None where that is not known any more
+    asked: Settings | None = None  #: with which it was asked for
+    unpainted: float = 1.0  #: see `StudioState`
+    is_live: bool = False  #: whether it is a quick one
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,6 +109,12 @@ class StudioState:
     def is_stale(self) -> bool:
         """Whether settings have changed since the grid was made."""
         return self.grid is not None and self.asked is not None and self.asked != self.settings
+
+
+NO_GRID: dict[str, Any] = {
+    "grid": None, "trade": None, "asked": None, "is_live": False, "solution": None, "report": None
+}  # fmt: skip
+"""Changes of a state without its grid, as of a scan that is another now."""
 
 
 class History:

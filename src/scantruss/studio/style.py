@@ -26,6 +26,16 @@ PANEL_STYLE = """<style>
 [data-mantine-color-scheme="dark"] .mantine-Checkbox-input:checked { border-color: #8cc4f8 !important }
 .studio-head { padding: .3em .8em 0; line-height: 1.35; font-size: .95em }
 .studio-head > [role="status"] { height: 2.7em; overflow-y: auto }
+:has(> div > div > div > .studio-head) { overflow: visible !important }
+div:has(> .studio-head), div:has(> .studio-head) + div + div, div:has(> .studio-head) + div + div + div,
+  div:has(> .studio-head) + div + div + div + div {
+  position: sticky !important; z-index: 3; background: var(--mantine-color-body); margin: 0 !important }
+div:has(> .studio-head) { top: 0; height: 60px }
+div:has(> .studio-head) + div + div { top: 60px; height: 16px }
+div:has(> .studio-head) + div + div + div { top: 76px; height: 36px; padding: 0 var(--mantine-spacing-xs) }
+div:has(> .studio-head) + div + div + div + div { top: 112px; height: 34px }
+.mantine-ScrollArea-viewport { scroll-padding-top: 150px }
+@media (max-height: 560px) { div:has(> .studio-head) ~ div { position: static !important } }
 .studio-refused { font-size: .85em; line-height: 1.06 }
 .studio-head > small { display: block; overflow: hidden; text-overflow: ellipsis; white-space: nowrap }
 pre { white-space: pre-wrap !important; overflow-wrap: anywhere }

@@ -14,7 +14,7 @@ from ..grid.marks import node_marks
 from ..structure.options import StructureSettings
 from .state import DEFAULT_STRUCTURE, Placed, StudioState
 
-MARK = re.compile(r"N\d+\??")
+NODE_MARK = re.compile(r"N\d+\??")
 LOST = "?"  # after the mark of a support where the grid has no node
 
 
@@ -25,7 +25,7 @@ def words_of(supports: str) -> list[str]:
 
 def marks_of(supports: str) -> list[str]:
     """Return the marks of nodes among supports, those that are lost too."""
-    return [word for word in words_of(supports) if MARK.fullmatch(word)]
+    return [word for word in words_of(supports) if NODE_MARK.fullmatch(word)]
 
 
 def marks_of_grid(state: StudioState) -> list[str]:

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 PRESENT = "the present one"
 NO_OTHER = "-"
+TAKE = "Take {} as the present one"
+LABEL_ABOVE = 1.2  #: of the name of a design over its highest node [scene]
 
 
 class CompareTab:
@@ -31,10 +33,12 @@ class CompareTab:
         )
         self.over = gui.add_checkbox("over the present one", False, hint="in its place instead of beside it")
         self.distance = gui.add_checkbox("colour by distance", False, hint="of its nodes from the present one")
+        self.taken = gui.add_button(TAKE.format("it"), disabled=True, hint="Undo takes that back")
         drop = gui.add_button("Forget that design")
         self.table = gui.add_html("")
         keep.on_click(view.step(lambda: view.session.keep_design(self.name.value)))
         drop.on_click(view.step(self._drop))
+        self.taken.on_click(view.step(lambda: view.session.take_design(self.other.value)))
         self.other.on_update(view.step(self._choose))
         self.over.on_update(view.step(self._lay_over))
         self.distance.on_update(view.step(lambda: self._draw(view.session.state)))
@@ -86,9 +90,11 @@ class CompareTab:
 
     def _draw(self, state: StudioState) -> None:
         scene, chosen = self.view.scene, self._chosen(state)
+        self.taken.disabled = chosen is None
+        self.taken.label = TAKE.format("it" if chosen is None else chosen.name)
         if chosen is None or state.cloud is None:
             self.view.legends.show("beside", "")
-            scene.remove("/beside/members", "/beside/panels", "/beside/name")
+            scene.remove("/beside/members", "/beside/panels", "/beside/name", "/beside/present")
             return
         frame = self.view.frame
         aside = 0.0 if self.is_over else BESIDE_FIRST * DRAWN_EXTENT
@@ -103,7 +109,20 @@ class CompareTab:
         self.view.legends.show("beside", legend)
         scene.lines("/beside/members", nodes[chosen.grid.edges], colors)
         scene.panels("/beside/panels", nodes, chosen.grid.triangles, None, 0.25, chosen.grid.panel_table)
-        scene.api.add_label("/beside/name", chosen.name, position=tuple((nodes.max(axis=0)).tolist()))
+        if self.is_over or state.grid is None:
+            scene.remove("/beside/present")
+            self._name(
+                "/beside/name", f"{chosen.name}, over {PRESENT}" if state.grid is not None else chosen.name, nodes
+            )
+            return
+        self._name("/beside/name", chosen.name, nodes)
+        self._name("/beside/present", PRESENT, frame.to_scene(state.grid.scan_nodes))
+
+    def _name(self, part: str, words: str, nodes: np.ndarray) -> None:
+        """Write a name above the middle of a grid with nodes (V, 3) in the scene."""
+        low, high = nodes.min(axis=0), nodes.max(axis=0)
+        above = (*((low + high) / 2)[:2].tolist(), float(high[2]) + LABEL_ABOVE)
+        self.view.scene.api.add_label(part, words, position=above)
 
     @property
     def ends(self) -> tuple[float, float] | None:

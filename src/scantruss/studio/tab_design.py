@@ -84,7 +84,7 @@ class DesignTab:
             )  # nothing below it moves when there is one
             return
         quality, certificate = grid.quality, grid.certificate
-        quick = " (quick, not saved)" if state.is_live else ""
+        quick = " (quick preview)" if state.is_live else ""
         self.figures.content = (
             f"{len(grid.nodes):,} nodes, {len(grid.edges):,} members{words_of_panels(grid)}{quick}\n\n"
             f"length {quality.length_mean:.4g}{unit}, CV {quality.length_cv:.4f}, G {quality.shape_mean:.4f}"

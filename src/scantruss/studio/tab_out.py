@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from ..export.formats import GRID, STRUCTURE, suffixes_of
 from ..runtime.progress import Progress
 from .further_files import FURTHER_FILES, further_files
-from .outputs import project_file, settings_files
+from .outputs import PREVIEW_WORDS, project_file, settings_files
 from .presses import Call
 
 if TYPE_CHECKING:
@@ -23,6 +23,7 @@ class OutTab:
     def __init__(self, view: StudioView, gui: Any) -> None:
         self.view = view
         session = view.session
+        self.preview = gui.add_markdown(PREVIEW_WORDS, visible=False)
         self.suffix: dict[str, Any] = {}
         for kind in (GRID, STRUCTURE):
             self.suffix[kind] = gui.add_dropdown(kind, tuple(suffixes_of(kind)), initial_value=".json")
@@ -63,6 +64,7 @@ class OutTab:
             self.view.client.send_file_download(name, content, save_immediately=True)
 
     def fill(self, before: StudioState | None, state: StudioState) -> None:
-        """Show the command lines of a state."""
+        """Show the command lines of a state, and whether its grid is a preview."""
+        self.preview.visible = state.is_live
         if before is not state:
             self.command.content = f"```\n{self.view.session.command()}\n```"

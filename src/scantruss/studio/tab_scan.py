@@ -51,8 +51,9 @@ class ScanTab:
         by_path.on_click(step(lambda: session.open_path(self.path.value)))
         opened.on_click(step(lambda: session.open_example(self.example.value)))
         self.unit.on_update(step(lambda: session.set_unit("" if self.unit.value == UNKNOWN_UNIT else self.unit.value)))
-        for each in (self.draws, self.coloring):
-            each.on_update(step(self.draw))
+        self._is_set = False  # whether a person has said if the scan is drawn
+        self.draws.on_update(step(self._set_drawn))
+        self.coloring.on_update(step(self.draw))
 
     def fill(self, before: StudioState | None, state: StudioState) -> None:
         """Show a state."""
@@ -78,11 +79,13 @@ class ScanTab:
         for tool in (self.crop, self.clean, self.remove, self.tape):
             tool.fill(before, state)
         if before is None or before.cloud is not cloud or before.grid is not state.grid:
-            if state.grid is not None and (before is None or before.grid is None):
-                self.draws.value = False  # it hides the grid
-            elif state.grid is None:
-                self.draws.value = True
+            if not self._is_set:
+                self.draws.value = state.grid is None  # it hides the grid
             self.draw()
+
+    def _set_drawn(self) -> None:
+        self._is_set = True
+        self.draw()
 
     def _fill_classes(self, state: StudioState) -> None:
         held = () if state.whole is None else state.whole.held_classes

@@ -39,7 +39,7 @@ SWINGS = 3  #: of a mode while it is shown
 AS_BUILT = "as built"
 SUPPORT_MODE = "support"
 SIZING = "Sizing and modes"
-CHOSEN = ("support_type", "size_by", *LAYER_CHOICES)  #: what is chosen from a list
+FROM_LISTS = ("support_type", "size_by", *LAYER_CHOICES)  #: what is chosen from a list
 
 
 def scale_of_text(text: str) -> float:
@@ -128,7 +128,7 @@ class StructureTab:
             each.on_update(view.step(self.draw))
         for name, each in (self.words | self.numbers | self.layers.fields).items():
             take = partial(self._take, name)
-            if name in CHOSEN:
+            if name in FROM_LISTS:
                 each.on_update(view.step(take))
             else:
                 view.typed(each, take)
@@ -174,7 +174,7 @@ class StructureTab:
         asked = state.structure_settings
         for name in STRUCTURE_WORDS:
             value = getattr(asked, name)
-            if name in CHOSEN:
+            if name in FROM_LISTS:
                 self.words[name].value = value
             elif name != "loads":
                 self.view.show_text(self.words[name], value)
@@ -193,7 +193,7 @@ class StructureTab:
         lost, size = words_of_lost(state), state.structure_settings.size
         self.lost.content, self.lost.visible = f"**lost:** {lost}", bool(lost)
         chosen = f"chosen by sizing, at most {size}" if size else ""
-        self.sized.content, self.sized.visible = f"the section is {chosen}: {SIZING}", bool(size)
+        self.sized.content, self.sized.visible = f"the section is {chosen}; see below", bool(size)
         self.folder.label = f"{SIZING} (sections {chosen})" if size else SIZING
 
     def support(self, found: tuple[str, int] | None) -> None:

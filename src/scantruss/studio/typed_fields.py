@@ -47,10 +47,16 @@ class TypedFields:
         """Take the steps of what was typed into fields, of all where none are named; whether none was refused."""
         with self._lock:
             named = [id(each) for each in fields] if fields else list(self._waiting)
-            taken = [self._waiting.pop(each) for each in named if each in self._waiting]
-        for _, timer in taken:
-            timer.cancel()
-        return all([self._do(step) for step, _ in taken])
+        return all([self._take_one(each) for each in named])
+
+    def _take_one(self, field: int) -> bool:
+        """Take the step of one field, while what was typed into others waits, so that nothing writes over it."""
+        with self._lock:
+            step, timer = self._waiting.pop(field, (None, None))
+        if step is None or timer is None:
+            return True
+        timer.cancel()
+        return self._do(step)
 
     def show(self, field: Any, text: str) -> None:
         """Write a text into a field, unless something that was typed there waits."""

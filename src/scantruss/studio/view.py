@@ -129,13 +129,18 @@ class StudioView(Presses):
 
     def _step(self, name: str) -> None:
         session = self.session
-        dict(zip(STEP_NAMES, (session.stop, session.undo, session.redo, self.see_all), strict=True))[name]()
+        dict(zip(STEP_NAMES, (session.stop, self.undo, session.redo, self.see_all), strict=True))[name]()
+
+    def undo(self) -> None:
+        """Drop the last corner of what is being drawn, else take the last step back."""
+        if not self.scan.crop.take_back():
+            self.session.undo()
 
     def _add_keys(self, gui: Any) -> None:
         """Let keys take steps too."""
         session = self.session
         for words, key, step in (
-            ("Undo", "Z", session.undo),
+            ("Undo", "Z", self.undo),
             ("Redo", "Y", session.redo),
             ("Generate", "enter", session.generate),
         ):

@@ -1,0 +1,124 @@
+"""What a person meets on a walk through the page of the studio: what stays in sight, what is kept as set, what is marked as old."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from browser import open_page
+from studio_person import choose, field, served_dome, tab, until
+
+from scantruss.grid.marks import node_marks
+
+
+def ready(page: Any, session: Any) -> None:
+    """Wait until nothing runs."""
+    assert session.worker.wait(60)
+    page.wait_for_selector("text=Generate")
+
+
+def say(page: Any, name: str, text: str) -> None:
+    """Type into a field, and wait for what it does."""
+    field(page, name).fill(text)
+    page.wait_for_timeout(1000)
+
+
+def test_what_is_refused_or_old_is_told_from_what_is(tmp_path: Path) -> None:
+    with served_dome(tmp_path) as (address, session, _), open_page(address) as (page, errors):
+        ready(page, session)
+        tab(page, "Out")
+        page.wait_for_selector("text=this is the quick preview")
+        assert "--effort quick" in page.inner_text("pre:visible")
+        tab(page, "Structure")
+        page.wait_for_selector("text=this is the quick preview")
+        page.click("button:has-text('Generate')")
+        page.wait_for_selector("text=this is the quick preview", state="hidden")
+        assert not session.state.is_live
+        assert session.grid is not None
+        first, last = node_marks(session.grid)[0], node_marks(session.grid)[-1]
+        say(page, "supports", "fixed")
+        page.click("button:has-text('Run')")
+        page.wait_for_selector("text=place some in Constraints")
+        say(page, "supports", "boundary")  # corrected: nothing is refused any more
+        page.wait_for_selector(".studio-refused", state="detached")
+        page.click("button:has-text('Run')")
+        page.wait_for_selector("text=lowest frequency")
+        say(page, "supports", first)
+        page.wait_for_selector("text=before the last change, supports boundary")
+        say(page, "supports", f"boundary+{last}")
+        page.click("button:has-text('Run')")
+        page.wait_for_selector("text=before the last change", state="detached")
+        page.click("text=Sizing and modes")
+        say(page, "size", "2")
+        page.wait_for_selector("text=the section is chosen by sizing, at most 2")
+        assert page.locator("text=Sizing and modes (sections chosen by sizing, at most 2)").count() == 1
+        tab(page, "Design")
+        say(page, "exactly", "60")
+        page.wait_for_selector("text=length 60 m is too large")
+        assert field(page, "exactly").input_value() == "60" and session.settings.length != 60
+        page.click("button:has-text('See all')")
+        assert until(lambda: field(page, "exactly").input_value() == f"{session.settings.length:g}", 10)
+        assert errors == []
+
+
+def test_progress_and_steps_stay_in_sight_and_draw_scan_as_set(tmp_path: Path) -> None:
+    with served_dome(tmp_path) as (address, session, _), open_page(address) as (page, errors):
+        ready(page, session)
+        page.wait_for_selector("text=ready")
+        assert not field(page, "draw scan").is_checked()
+        field(page, "draw scan").click()
+        choose(page, "m", "cm")
+        ready(page, session)
+        page.wait_for_timeout(500)
+        assert field(page, "draw scan").is_checked()
+        assert until(lambda: session.settings.unit == "cm" and session.grid is not None)
+        assert field(page, "draw scan").is_checked()
+        tab(page, "Structure")
+        page.click("text=Sizing and modes")
+        viewport = page.locator(".mantine-ScrollArea-viewport").first
+        places = []
+        for down in (0, 400):
+            viewport.evaluate(f"(each) => each.scrollTop = {down}")
+            page.wait_for_timeout(300)
+            boxes = [page.locator(each).first.bounding_box() for each in
+                     (".studio-head", "[role=progressbar]", "button:has-text('Generate')", "button:has-text('Undo')")]  # fmt: skip
+            places.append([box["y"] for box in boxes])
+            assert all(box["y"] >= 0 and box["y"] + box["height"] <= 260 for box in boxes)
+            assert all(np.diff(places[-1]) > 0)
+        assert viewport.evaluate("(each) => each.scrollTop") > 100
+        for name in ("Stop", "Undo"):
+            page.locator(f"button:has-text('{name}')").first.click(trial=True, timeout=3000)
+        assert errors == []
+
+
+def test_undo_drops_the_last_corner_of_a_polygon_and_one_that_crosses_itself_is_refused(tmp_path: Path) -> None:
+    with served_dome(tmp_path) as (address, session, _), open_page(address) as (page, errors):
+        ready(page, session)
+        session.measure(((1.0, 1.0, 1.0), (2.0, 2.0, 1.0)))
+        page.click("text=Crop")
+        page.click("button:has-text('Polygon')")
+        page.wait_for_selector("input[value='corner of crop']")
+        page.wait_for_timeout(500)
+        for x, y in ((300, 250), (550, 250), (550, 500)):
+            page.mouse.click(x, y)
+            page.wait_for_timeout(400)
+        assert until(lambda: field(page, "crop").input_value().count(",") == 5)
+        page.mouse.click(420, 150)
+        page.wait_for_selector("text=the polygon would cross itself")
+        assert field(page, "crop").input_value().count(",") == 5
+        page.mouse.click(300, 500)
+        assert until(lambda: field(page, "crop").input_value().count(",") == 7)
+        page.keyboard.press("Control+z")
+        assert until(lambda: field(page, "crop").input_value().count(",") == 5)
+        assert session.state.tape and session.history.words[0] == "tape"  # which stays
+        assert errors == []
+
+
+def test_a_page_says_when_the_server_has_gone(tmp_path: Path) -> None:
+    with served_dome(tmp_path) as (address, session, server), open_page(address) as (page, errors):
+        ready(page, session)
+        page.wait_for_timeout(4000)  # it asks once
+        assert page.locator("text=Connection lost").count() == 0
+        server.stop()
+        page.wait_for_selector("text=Connection lost", timeout=15_000)
+        page.screenshot(path=str(tmp_path / "lost.png"))
+        assert errors == []
