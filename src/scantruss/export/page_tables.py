@@ -18,6 +18,7 @@ from ..layouts.kinds import families_of_grid, kinds_of_grid
 from .drawing.structure import OVERUSED
 from .model import Model
 
+OFF_PLANE = "off its plane / diagonal"  # name of a column of panels
 COLORINGS: tuple[tuple[str, str, str, float | None], ...] = (  # kind, column, words, middle of a diverging scale
     ("members", "utilization", "utilization", None),
     ("members", "axial force", "axial force of the greatest size, tension positive", 0.0),
@@ -27,7 +28,8 @@ COLORINGS: tuple[tuple[str, str, str, float | None], ...] = (  # kind, column, w
     ("members", "family", "family of lengths, shortest first", None),
     ("panels", "kind", "kind of panel, the most frequent first", None),
     ("nodes", "kind", "kind of joint, the most frequent first", None),
-    ("panels", "quality", "quality of triangles, 1 equilateral", None),
+    ("panels", "quality", "quality of panels, 1 regular", None),
+    ("panels", OFF_PLANE, "panels off their plane, over the mean diagonal", None),
     ("nodes", "members", "members at a node", None),
     ("nodes", "distance from scan", "distance of nodes from the scan", None),
 )
@@ -98,7 +100,7 @@ def tables_of(model: Model, made_of: Grid | None = None) -> Tables:
         column("quality", "", shape_qualities_of(model.local, corners)),
     ]
     if corners.shape[1] > 3:
-        panels.append(column("off its plane / diagonal", "", planarity_of(model.local, corners)))
+        panels.append(column(OFF_PLANE, "", planarity_of(model.local, corners)))
     if model.truss is not None:
         held = np.isin(np.arange(len(model.local)), model.supported)
         nodes.append(column("support", "", ["yes" if each else "no" for each in held.tolist()]))

@@ -13,7 +13,7 @@ import numpy as np
 from ..errors import words_of_number
 from ..export.formats import model_of
 from ..export.page import encode_page
-from ..export.page_tables import PageColumn, Tables, tables_of
+from ..export.page_tables import OFF_PLANE, PageColumn, Tables, tables_of
 from ..export.style import FileStyle
 from ..grid.grid import Grid
 from ..scan.cloud import PointCloud
@@ -38,7 +38,8 @@ HISTOGRAM_TALL = 0.3  #: height of a plot over its width
 PLOTTED = (  # kind, column, words; those that are not known are left out
     ("members", "length", "member length"),
     ("members", "length / desired", "length over the desired length"),
-    ("panels", "quality", "quality of triangles, 1 equilateral"),
+    ("panels", "quality", "quality of panels, 1 regular"),
+    ("panels", OFF_PLANE, "panels off their plane, over the mean diagonal"),
     ("members", "fold", "angle between the panels, 180 where level"),
     ("nodes", "distance from scan", "distance of nodes from the scan"),
 )

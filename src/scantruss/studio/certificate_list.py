@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..export.page_tables import Pin, pins_of
+from .page_words import in_words_of_page
 
 if TYPE_CHECKING:
     from .state import StudioState
@@ -39,7 +40,9 @@ class CertificateList:
         if certificate is None:
             self.words.content = NO_GRID_YET
         else:
-            warned = "".join(f"\n\n**warning:** the grid {each.words}" for each in certificate.warnings)
+            warned = "".join(
+                f"\n\n**warning:** the grid {in_words_of_page(each.words)}" for each in certificate.warnings
+            )
             self.words.content = f"certificate: {certificate}{warned}"
         words = tuple(f"{k} {pin.words} {pin.value}".strip() for k, pin in enumerate(self._pins, 1))
         self.places.options = words or ("-",)

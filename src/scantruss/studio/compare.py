@@ -10,6 +10,7 @@ import numpy as np
 from ..check.distances import distances_to_grid
 from ..errors import InputError, words_of_number
 from ..grid.grid import Grid
+from .layers_tool import figures_of_layers
 from .state import NO_GRID, Design, StudioState
 from .support_places import supports_on
 
@@ -68,6 +69,7 @@ def structure_figures(state: StudioState) -> list[tuple[str, str]]:
         ("axial forces", f"{values['force_min'] / 1e3:.4g} to {values['force_max'] / 1e3:.4g} kN"),
         ("mass without nodes", f"{report.truss.mass:,.0f} kg"),
     ]
+    rows += figures_of_layers(report.truss)
     if report.rounds:
         rows.append(("sections", " ".join(values["sections"])))
     if report.buckling is not None and len(report.buckling.values):
@@ -87,10 +89,11 @@ def grid_figures(grid: Grid) -> list[tuple[str, str]]:
     return [
         ("nodes", f"{len(grid.nodes):,}"),
         ("members", f"{len(grid.edges):,}"),
-        ("panels", f"{len(grid.triangles):,}"),
+        ("panels", f"{len(grid.panel_table):,} {grid.panels_are}"),
         ("member length, mean", f"{quality.length_mean:.4g}{unit}"),
         ("length std / mean (CV)", f"{quality.length_cv:.4f}"),
         ("shape quality G", f"{quality.shape_mean:.4f}"),
+        *(() if quality.planarity_max is None else (("farthest off its plane", f"{quality.planarity_max:.2%}"),)),
         ("members in all", f"{grid.lengths.sum():,.5g}{unit}"),
         ("node farthest from the scan", "-" if away is None else f"{away.largest.value:.3g}{unit}"),
     ]

@@ -78,9 +78,12 @@ def _structure_report(state: StudioState, suffix: str) -> dict[str, bytes]:
 
 def _printed(state: StudioState, size: float) -> dict[str, bytes]:
     from ..export.printed.apart import print_apart
+    from ..structure.layered import grid_in_metres
 
     model_to_show(state, GRID)
     grid = state.grid
+    if state.solution is not None and state.solution.truss.layers is not None:
+        grid = grid_in_metres(state.solution.truss)
     assert grid is not None
     if not grid.unit:
         raise InputError("a model to print needs the unit of the scan; choose it in the Scan tab and generate again")

@@ -115,9 +115,10 @@ def command_of(state: StudioState) -> str:
         taken += [word for part in state.cleaning.crop for word in ("--crop", part)]
         lines.append(shlex.join(["scantruss", "clean", name, CLEANED, *taken, *state.cleaning.options]))
         name = CLEANED
+    cells = "" if made.cells == Settings.cells else f" --cells {made.cells}"
     lines += [
         shlex.join(["scantruss", "grid", name, "grid.json", "--settings", "settings.json"]),
-        f"# settings.json: --length {made.length:g} --effort {made.effort} and all else",
+        f"# settings.json: --length {made.length:g}{cells} --effort {made.effort} and all else",
     ]
     grid = "grid.json"
     if state.grid is not None and (alike := state.grid.alike) is not None:

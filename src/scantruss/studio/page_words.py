@@ -23,6 +23,8 @@ PHRASES = tuple(
         (r"(?:give it with|give) --unit(?: (?:\w+\|)+\w+|,? (?:one of )?(?:\w+, )*\w+ or \w+)?", "choose it in Scan, unit"),
         (r"leave --unit out", "choose that unit in Scan"),
         (r"another --length", "another length"),
+        (r"use --joints rigid", 'say rigid in "joints"'),
+        (r"\(--rows curvature\)", "(Design, rows follow)"),
         (r"(?:make it with|give it) --loads", "name some in loads, and press Run"),
         (r"with --crop or --piece", "with Scan, Crop"),
         (r"; --keep-failed (?:gives it all the same|uses it anyway)", ""),

@@ -64,17 +64,18 @@ def nearest_panel(corners: np.ndarray, origin: np.ndarray, ahead: np.ndarray) ->
 
 
 def pick(
-    nodes: np.ndarray, members: np.ndarray, panels: np.ndarray, origin: np.ndarray, ahead: np.ndarray
+    nodes: np.ndarray, members: np.ndarray, triangles: np.ndarray, origin: np.ndarray, ahead: np.ndarray
 ) -> tuple[str, int] | None:
-    """Return the node, member or panel under a ray as ("nodes", 3); what panels hide is not found.
+    """Return the node, member or triangle of a panel under a ray as ("nodes", 3); what panels hide is not found.
 
     Parameters
     ----------
     nodes : (V, 3)
     members : (M, 2) int
-    panels : (T, 3) int
+    triangles : (T, 3) int
+        Of the panels.
     """
-    panel = nearest_panel(nodes[panels], origin, ahead)
+    panel = nearest_panel(nodes[triangles], origin, ahead)
     limit = np.inf if panel is None else panel[1] * (1 + 2 * NEAR_ENOUGH)
     node = nearest_point(nodes, origin, ahead)
     if node is not None and float((nodes[node] - origin) @ ahead) <= limit:

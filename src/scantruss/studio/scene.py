@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from ..grid.panels import panel_of_triangles
 from .colours import DIMMED, FROM_GRID, PLAIN, colors_of_scan
 from .frame import SceneFrame, SectionPlane
 from .tone import to_be_seen
@@ -204,15 +205,22 @@ class Scene:
         )  # fmt: skip
 
     def panels(
-        self, name: str, nodes: np.ndarray, triangles: np.ndarray, colors: np.ndarray | None, opacity: float | None
+        self,
+        name: str,
+        nodes: np.ndarray,
+        triangles: np.ndarray,
+        colors: np.ndarray | None,
+        opacity: float | None,
+        panels: np.ndarray | None = None,
     ) -> None:
-        """Draw triangles (T, 3) of nodes (V, 3), in one colour or each in its own (T, 3)."""
+        """Draw triangles (T, 3) of nodes (V, 3), or the panels (P, K) that they are of, in one colour or each in its own (P, 3)."""
         self.remove(name, f"{name} coloured")
         if not len(triangles):
             return
-        corners = nodes[triangles]
-        middles = corners.mean(axis=1, keepdims=True)
-        corners = (middles + DRAWN_SHARE * (corners - middles)).reshape(-1, 3).astype(np.float32)
+        table = triangles if panels is None else panels
+        owner, there = panel_of_triangles(table), (table >= 0)[:, :, None]
+        middles = ((nodes[table] * there).sum(axis=1) / there.sum(axis=1))[owner][:, None]
+        corners = (middles + DRAWN_SHARE * (nodes[triangles] - middles)).reshape(-1, 3).astype(np.float32)
         faces = np.arange(len(corners), dtype=np.uint32).reshape(-1, 3)
         if colors is None:
             self.api.add_mesh_simple(
@@ -223,7 +231,9 @@ class Scene:
         import trimesh
 
         body = trimesh.Trimesh(corners, faces, process=False)
-        rgba = np.concatenate([np.repeat(lit(colors, PANEL_GAMMA), 3, axis=0), np.full((len(corners), 1), 255)], axis=1)
+        rgba = np.concatenate(
+            [np.repeat(lit(colors, PANEL_GAMMA)[owner], 3, axis=0), np.full((len(corners), 1), 255)], axis=1
+        )
         body.visual.vertex_colors = rgba.astype(np.uint8)
         self.api.add_mesh_trimesh(f"{name} coloured", body)
 
@@ -253,7 +263,12 @@ class Scene:
         elif kind == "members":
             self.lines("/selected/member", places[model.members[[number]]], color, WIDE)
         else:
-            self.chain("/selected/panel", places[model.triangles[number]], True, SELECTED_COLOR, WIDE)
+            self.chain("/selected/panel", places[model.panel_loops[number]], True, SELECTED_COLOR, WIDE)
+
+
+def is_layered(model: Model) -> bool:
+    """Whether a structure has layers below its panels, which must be seen through them."""
+    return model.truss is not None and model.truss.layers is not None
 
 
 def lit(colors: np.ndarray, gamma: float) -> np.ndarray:

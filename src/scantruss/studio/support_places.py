@@ -28,6 +28,11 @@ def marks_of(supports: str) -> list[str]:
     return [word for word in words_of(supports) if NODE_MARK.fullmatch(word)]
 
 
+def marks_of_grid(state: StudioState) -> list[str]:
+    """Return the mark of each node of the grid; a structure with more layers may count its nodes with more digits."""
+    return [] if state.grid is None else node_marks(state.grid)
+
+
 def switched(supports: str, mark: str) -> str:
     """Return supports with a node besides, or without it where it is one of them."""
     words = words_of(supports)
@@ -91,7 +96,7 @@ def check_none_is_lost(state: StudioState) -> None:
 
 
 def for_new_scan(before: StructureSettings) -> StructureSettings:
-    """Return settings of a structure without what belongs to the scan before: supports, loads by place, scale and sizing."""
+    """Return settings of a structure without what belongs to the scan before: supports, loads by place, scale, depth of layers, sizing."""
     usual = DEFAULT_STRUCTURE
     loads = tuple(load for load in before.loads if not isinstance(load, Mapping)) or usual.loads
     return before.replace(
@@ -99,6 +104,7 @@ def for_new_scan(before: StructureSettings) -> StructureSettings:
         support_type=usual.support_type,
         loads=loads,
         scale=usual.scale,
+        double_layer=usual.double_layer,
         size=usual.size,
         size_by=usual.size_by,
     )

@@ -108,7 +108,7 @@ class CompareTab:
         legend = legend_of(f"{chosen.name}: {words}", chosen.grid.unit, low, high, False)
         self.view.legends.show("beside", legend)
         scene.lines("/beside/members", nodes[chosen.grid.edges], colors)
-        scene.panels("/beside/panels", nodes, chosen.grid.triangles, None, 0.25)
+        scene.panels("/beside/panels", nodes, chosen.grid.triangles, None, 0.25, chosen.grid.panel_table)
         if self.is_over or state.grid is None:
             scene.remove("/beside/present")
             self._name(

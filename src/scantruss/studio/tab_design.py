@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
 from ..settings.records import EFFORTS, PREFER
+from .cells_tool import CellsTool, words_of_panels, words_of_planes
 from .feature_list import FeatureList
 from .length_brush import LengthBrush
 from .rows_tool import RowsTool
@@ -28,6 +29,7 @@ class DesignTab:
         self.slider = gui.add_slider("length", 0.5, 2.0, 0.01, 1.0, hint="a quick grid is made while it moves")
         self.length = gui.add_text("exactly", "1", hint="any length, in the unit of the scan")
         self.figures = gui.add_markdown("")
+        self.cells = CellsTool(view, gui)
         self.effort = gui.add_dropdown("effort", EFFORTS, hint="of Generate")
         self.prefer = gui.add_dropdown("prefer", PREFER, hint="what matters more: equal members or regular triangles")
         with gui.add_folder("Holes and ridges", expand_by_default=False):
@@ -71,7 +73,7 @@ class DesignTab:
             self.view.show_text(self.length, f"{float(f'{state.main_length:.9g}'):g}")
         if before is None or before.grid is not state.grid or before.is_live != state.is_live:
             self._fill_grid(state)
-        for part in (self.features, self.rows, self.brush, self.trade):
+        for part in (self.cells, self.features, self.rows, self.brush, self.trade):
             part.fill(before, state)
 
     def _fill_grid(self, state: StudioState) -> None:
@@ -84,8 +86,9 @@ class DesignTab:
         quality, certificate = grid.quality, grid.certificate
         quick = " (quick preview)" if state.is_live else ""
         self.figures.content = (
-            f"{len(grid.nodes):,} nodes, {len(grid.edges):,} members{quick}\n\n"
+            f"{len(grid.nodes):,} nodes, {len(grid.edges):,} members{words_of_panels(grid)}{quick}\n\n"
             f"length {quality.length_mean:.4g}{unit}, CV {quality.length_cv:.4f}, G {quality.shape_mean:.4f}"
+            f"{words_of_planes(grid)}"
         )
         if certificate is None:
             self.figures.content += f"\n\n{NO_WORDS}"

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..export.page_tables import PageColumn, colorings_of
+from ..grid.panels import panel_of_triangles
 from .certificate_list import CertificateList
 from .colours import BRUSHED, DIMMED, colors_of, histogram_of, legend_of, legend_of_more, rgb_of, values_of
 from .drawn_lines import numbers_of
@@ -22,6 +23,7 @@ from .scene import (
     TUBE_RADIUS,
     cut,
     drawn_colors,
+    is_layered,
     plain_colors,
 )
 
@@ -194,15 +196,16 @@ class GridTab:
         as_points = drawn & ~as_balls  # their colours are those of the legend, without shade
         scene.balls("/grid/balls", places[as_balls], of_nodes[as_balls], BALL_RADIUS * size)
         scene.points("/grid/nodes", places[as_points], np.ascontiguousarray(of_nodes[as_points]), 0.2 * size)
-        triangles, of_panels = model.triangles, colors["panels"]
-        visible = np.ones(len(triangles), bool) if section is None else kept[triangles].all(axis=1)
+        panels, of_panels = model.panels, colors["panels"]
+        visible = (kept[panels] | (panels < 0)).all(axis=1)
         visible &= (self.panels.value or of_panels is not None) and not self.view.structure.is_moved
         scene.panels(
             "/grid/panels",
             places,
-            triangles[visible],
+            model.triangles[visible[panel_of_triangles(panels)]],
             None if of_panels is None else of_panels[visible],
-            0.35 if len(model.members) <= MOST_DRAWN_LINES else None,
+            0.35 if len(model.members) <= MOST_DRAWN_LINES or is_layered(model) else None,
+            panels[visible],
         )
 
     # ---- theme

@@ -17,11 +17,12 @@ from ..structure.supports import HELD
 from .colours import colors_of, legend_of
 from .compare import structure_figures
 from .frame import DRAWN_EXTENT
+from .layers_tool import LAYER_CHOICES, LayersTool, words_of_depths
 from .outputs import PREVIEW_WORDS
 from .page_words import in_words_of_page
 from .scene import barbed, spread
 from .session import STRUCTURE_WORDS
-from .support_places import marks_of, switched, words_of_lost
+from .support_places import marks_of, marks_of_grid, switched, words_of_lost
 
 if TYPE_CHECKING:
     from .state import StudioState
@@ -39,7 +40,7 @@ SWINGS = 3  #: of a mode while it is shown
 AS_BUILT = "as built"
 SUPPORT_MODE = "support"
 SIZING = "Sizing and modes"
-FROM_LISTS = ("support_type", "size_by")  #: what is chosen from a list
+FROM_LISTS = ("support_type", "size_by", *LAYER_CHOICES)  #: what is chosen from a list
 
 
 def scale_of_text(text: str) -> float:
@@ -73,7 +74,8 @@ def times_of(factor: float) -> str:
 def words_of_asked(state: StudioState) -> str:
     """Return how the structure that is shown is supported, of what it is made and what it carries."""
     shown = state.shown_structure
-    return f"supports {shown.supports}, {shown.section}, {shown.material}, {','.join(map(str, shown.loads))}"
+    layers = f", double layer {words_of_depths(shown)}" if shown.double_layer else ""
+    return f"supports {shown.supports}, {shown.section}, {shown.material}, {','.join(map(str, shown.loads))}{layers}"
 
 
 class StructureTab:
@@ -110,6 +112,7 @@ class StructureTab:
                 "buckling modes", str(kept.buckling), hint="of the combination that buckles first"
             )
             self.numbers["frequencies"] = gui.add_text("frequencies", str(kept.frequencies), hint="lowest natural ones")
+        self.layers = LayersTool(gui, kept)
         run = gui.add_button("Run", color="blue")
         self.results, self.weights = gui.add_markdown(""), gui.add_html("")
         self.case = gui.add_dropdown("shape under", (AS_BUILT,), hint="load cases, combinations and modes")
@@ -124,7 +127,7 @@ class StructureTab:
         view.modes[SUPPORT_MODE] = lambda origin, ahead: self.support(view.under(origin, ahead))
         for each in (self.factor, self.loads, self.supports):
             each.on_update(view.step(self.draw))
-        for name, each in (self.words | self.numbers).items():
+        for name, each in (self.words | self.numbers | self.layers.fields).items():
             take = partial(self._take, name)
             if name in FROM_LISTS:
                 each.on_update(view.step(take))
@@ -145,7 +148,9 @@ class StructureTab:
         self.view.look.draw()
 
     def _run(self) -> None:
-        self.view.session.set_structure(**{name: self._value(name) for name in (*self.words, *self.numbers)})
+        self.view.session.set_structure(
+            **{name: self._value(name) for name in (*self.words, *self.numbers, *self.layers.fields)}
+        )
         self.view.session.run_structure()
 
     def _take(self, name: str) -> None:
@@ -156,6 +161,8 @@ class StructureTab:
         """Return what a field says."""
         if name in self.words:
             return self.words[name].value
+        if name in self.layers.fields:
+            return self.layers.value(name)
         each = self.numbers[name]
         try:
             return scale_of_text(each.value) if name == "scale" else int(each.value)
@@ -174,6 +181,7 @@ class StructureTab:
                 self.view.show_text(self.words[name], value)
             elif loads_of_words(self.words[name].value) != value:
                 self.view.show_text(self.words[name], ",".join(map(str, value)))
+        self.layers.show(asked, self.view.show_text)
         for name, each in self.numbers.items():
             with contextlib.suppress(InputError):
                 if self._value(name) == getattr(asked, name):
@@ -194,13 +202,18 @@ class StructureTab:
         shown = self.view.shown_model()
         if shown is None or found is None or found[0] != "nodes":
             raise InputError("no node is there; click on a node of the grid")
-        mark = shown[0].node_marks[found[1]]
+        known = marks_of_grid(self.view.session.state)
+        if found[1] >= len(known):
+            raise InputError(
+                'that node is of a layer below; click on one of the grid, and say "supports on" inner to hold the last layer'
+            )
+        mark = known[found[1]]
         supports = switched(self.words["supports"].value, mark)
         self.words["supports"].value = supports
         self.view.session.set_structure(supports=supports)
         self.view.say(f"supports: {supports or 'none'}; press Run")
-        marks = [word for word in marks_of(supports) if word in shown[0].node_marks]
-        self._mark_supports([shown[0].node_marks.index(word) for word in marks], "/supports/chosen")
+        held = [known.index(word) for word in marks_of(supports) if word in known]
+        self._mark_supports(held, "/supports/chosen")
 
     def _mark_supports(self, nodes: list[int], name: str) -> None:
         shown = self.view.shown_model()

@@ -12,6 +12,7 @@ import numpy as np
 from ..export.formats import GRID, STRUCTURE
 from ..export.model import Model
 from ..export.page_tables import Tables, tables_of
+from ..grid.panels import panel_of_triangles
 from ..structure.build import scale_of
 from .colours import colorings_of_scan
 from .frame import BESIDE_FIRST, DRAWN_EXTENT, ROOM_AROUND, SceneFrame, distance_to_see
@@ -20,7 +21,7 @@ from .legends import Legends
 from .outputs import model_to_show
 from .picking import NEAR_ENOUGH, pick
 from .presses import Presses
-from .scene import FIRST_POINTS, Scene
+from .scene import FIRST_POINTS, Scene, is_layered
 from .session import Session
 from .state import StudioState
 from .style import PANEL_STYLE
@@ -176,13 +177,14 @@ class StudioView(Presses):
         if (shown := self.shown_model()) is None:
             return None
         model, _ = shown
-        return pick(
-            self.places(model),
-            model.members,
-            model.triangles if self.look.panels.value else model.triangles[:0],
-            origin,
-            ahead,
-        )
+        triangles = model.triangles if self.look.panels.value else model.triangles[:0]
+        found = None
+        if is_layered(model):  # its panels hide nothing
+            found = pick(self.places(model), model.members, triangles[:0], origin, ahead)
+        found = found or pick(self.places(model), model.members, triangles, origin, ahead)
+        if found is None or found[0] != "panels":
+            return found
+        return "panels", int(panel_of_triangles(model.panels)[found[1]])
 
     def select(self, kind: str, number: int) -> None:
         """Show the row of a node, member or panel in its schedule, and draw it in another colour."""
