@@ -38,8 +38,9 @@ def layered(folder: Path) -> Session:
 
 def test_a_double_layer_is_that_of_the_command_line_and_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     session = layered(tmp_path)
-    assert session.solution is not None and session.grid is not None
-    truss = session.solution.truss
+    solution, grid = session.solution, session.grid
+    assert solution is not None and grid is not None
+    truss = solution.truss
     assert set(truss.member_sets) == {TOP, BOTTOM, WEB} and truss.pinned
     figures = dict(structure_figures(session.state))
     assert [figures[name].split()[0] for name in (TOP, BOTTOM, WEB)] == [
@@ -63,7 +64,8 @@ def test_a_double_layer_is_that_of_the_command_line_and_kept(tmp_path: Path, mon
     assert session.state.structure_settings.double_layer == ""
     session.run_structure()
     done(session)
-    assert session.solution is not None and len(session.solution.truss.members) == len(session.grid.edges)
+    single = session.state.solution
+    assert single is not None and len(single.truss.members) == len(grid.edges)
     assert not {TOP, BOTTOM, WEB} & dict(structure_figures(session.state)).keys()
 
 
