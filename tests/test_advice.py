@@ -314,3 +314,13 @@ def test_where_no_length_passes_those_tried_are_named_and_not_tried_again(
     assert f"no grid passes with the lengths tried, {min(for_advice):g} to {max(for_advice):g}, either" in said
     later = made[len(for_advice) :]
     assert made[: len(for_advice)] == for_advice and len(set(later)) == 1  # the grid itself, at the usual length
+
+
+def test_a_length_is_found_that_passes_only_far_above_one_that_loses_limbs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As of a hall: its columns are limbs to short members, and known for columns by long ones."""
+    cloud = cloud_of("limpet")
+    usual = Advice(cloud, st.Settings(length=1.0)).suggest()
+    monkeypatch.setattr(LengthTrial, "loses_limbs", property(lambda trial: not trial.passed))
+    counted_runs(monkeypatch, lambda length: length > 1.8 * usual)
+    advice = Advice(cloud, st.Settings(length=1.0))
+    assert advice.suggest() > 1.8 * usual and advice.passes

@@ -22,8 +22,8 @@ SPACINGS_EMPTY = 10.0  # ... and in spacings of the points
 AROUND_END = (
     0.35  # radius around an end of a member within which points tell how the surface lies there [member lengths]
 )
-FEWEST_AROUND_END = 6  # fewest such points
-MOST_ACROSS = 0.1  # variance across the surface there, in the next one, above which they are none
+FEWEST_AT_END = 6  # fewest such points
+FLAT_AT_END = 0.1  # variance across the surface there, in the next one, above which they are none
 STEEP = 0.6  # sine of the angle between a member and the surface above which it leaves it
 FEWEST_MEMBERS = (
     3  # such members at a node, and half of all, from which on it hangs: at a cliff or a horn there are fewer
@@ -83,8 +83,8 @@ def _hangs(grid: Grid, chosen: np.ndarray, uses: np.ndarray) -> np.ndarray:
 def _normal(place: np.ndarray, reach: float, points: np.ndarray) -> np.ndarray:
     """Return the normal (3,) of the surface of the points by ascending x (N, 3) around a place, (0, 0, 0) where they form none."""
     around = points_within(place, reach, points)
-    if len(around) < FEWEST_AROUND_END:
+    if len(around) < FEWEST_AT_END:
         return np.zeros(3)
     variances, axes = np.linalg.eigh(np.cov(around.T))
-    normal: np.ndarray = axes[:, 0] if variances[0] < MOST_ACROSS * variances[1] else np.zeros(3)
+    normal: np.ndarray = axes[:, 0] if variances[0] < FLAT_AT_END * variances[1] else np.zeros(3)
     return normal

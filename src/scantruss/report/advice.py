@@ -51,6 +51,7 @@ MOST_TRIED = 20.0  # grids that are made for a suggestion, or to find a length n
 POINTS_LOOKED_AT = 2_000_000  # points that are looked at for that
 LEAST_TRIED = 5.0  # grids that are made for that even where the scan has more points
 TRIED_AROUND = 6.0  # grids that are made besides for the lengths of the table, one each
+TRIED_LONGER = 2  # grids that are made of each longer length where no other has passed, of those for the table
 TRIED_USUAL = 4.0  # grids that are made at the usual length where no length nearby passes and it is far away
 FAR_TOO_SHORT = 0.2  # share of the shortest possible length below which the usual one is looked at alone: that length is in another unit
 POINTS_PER_MEMBER = 9  # points that cost as much as a member of the grid
@@ -113,6 +114,7 @@ class Advice:
             float, tuple[Settings, Iterator[Attempt], AttemptLimit]
         ] = {}  # what is left to try of each length
         self.is_spent = False  #: whether a suggestion was looked for
+        self._has_table_grids = True  # whether the grids that the table may cost are not yet made
         self._usual = self._usual_length()
         self._count_at(self._usual, MOST_TRIED)
 
@@ -248,11 +250,17 @@ class Advice:
         return min(followed or passing, key=self._far_from_usual, default=self._usual)
 
     def _try_longer(self) -> None:
-        """Try longer lengths than the usual one, a few grids each, until one passes: columns are then seen for what they are."""
+        """Try longer lengths than the usual one until one passes, with the grids of the table: columns are then seen for what they are.
+
+        Not of a scan so large that fewer grids are made.
+        """
+        if LEAST_TRIED * self._cost(self._usual) >= POINTS_LOOKED_AT:
+            return
+        self._count_at(self._usual, TRIED_AROUND)
+        self._has_table_grids = False
         for share in LAST_LENGTHS:
             length = min(_two_digits(share * self._usual), length_range(self._cloud)[1])
-            self._count_at(length, A_FEW)
-            trial = self.try_length(length, A_FEW)
+            trial = self.try_length(length, TRIED_LONGER)
             if trial is not None and trial.passed:
                 return
 
@@ -315,7 +323,8 @@ class Advice:
         """Try the lengths of a table, one grid each, and return them: one, the two below and the two above."""
         below, above = self.next_below(length), self.next_above(length)
         table = list(dict.fromkeys((self.next_below(below), below, length, above, self.next_above(above))))
-        self._count_at(length, TRIED_AROUND)
+        if self._has_table_grids:
+            self._count_at(length, TRIED_AROUND)
         for each in sorted(table, key=lambda other: (other < length, abs(np.log(other / length)))):
             self.try_length(each, most=1)
         return table
