@@ -58,12 +58,14 @@ def test_a_double_layer_is_that_of_the_command_line_and_kept(tmp_path: Path, mon
     assert again.state.structure_settings.double_layer == DEPTH and again.solution is not None
     assert again.files("structure", ".json")["structure.json"] == ours
     session.undo()
-    assert session.solution is None and session.state.structure_settings.double_layer == DEPTH
+    taken_back = session.state
+    assert taken_back.solution is None and taken_back.structure_settings.double_layer == DEPTH
     session.undo()
     assert session.state.structure_settings.double_layer == ""
     session.run_structure()
     done(session)
-    assert session.solution is not None and len(session.solution.truss.members) == len(session.grid.edges)
+    single = session.state.solution
+    assert single is not None and len(single.truss.members) == len(session.grid.edges)
     assert not {TOP, BOTTOM, WEB} & dict(structure_figures(session.state)).keys()
 
 
