@@ -160,6 +160,39 @@ def walk(tour: Walk) -> None:
     tour.see(2500)
 
 
+def walk_further(tour: Walk) -> None:
+    """Make a grid of quads and a double layer, each for a picture of its own."""
+    page = tour.page
+    tour.tab("Design")
+    tour.field("exactly").fill("1.4")
+    page.wait_for_timeout(1000)
+    tour.choose("cells", "quad")
+    tour.field("planar panels").click()
+    tour.push("Generate")
+    page.wait_for_selector("text=undo: generate", timeout=60_000)
+    tour.tab("Grid")
+    tour.choose("grid", "panels off their plane, over the mean diagonal")
+    tour.tab("Design")
+    tour.rest(2500)
+    tour.see(0, "quads")
+    tour.choose("cells", "triangle")
+    tour.field("exactly").fill("2.2")
+    tour.push("Generate")
+    page.wait_for_timeout(1000)
+    tour.rest(1500)
+    tour.tab("Structure")
+    page.click("text=Double layer and joints")
+    page.wait_for_timeout(500)
+    tour.field("depth").fill("1.2")
+    tour.push("Run")
+    page.wait_for_selector("text=/^web .* members of/", timeout=60_000)
+    page.locator("xpath=//label[normalize-space(.)='loads']/following::input[1]").last.uncheck()
+    page.mouse.move(1040, 500)
+    page.mouse.wheel(0, -220)  # up to the fields again
+    tour.rest(2500)
+    tour.see(0, "layers")
+
+
 def main() -> None:
     """Walk and write."""
     from playwright.sync_api import sync_playwright
@@ -177,6 +210,7 @@ def main() -> None:
         tour = Walk(browser.new_page(viewport=PAGE_SIZE), session)
         tour.page.goto(f"http://127.0.0.1:{server.get_port()}/")
         walk(tour)
+        walk_further(Walk(tour.page, session))
         browser.close()
         session.stop()
         server.stop()

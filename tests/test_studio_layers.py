@@ -38,9 +38,8 @@ def layered(folder: Path) -> Session:
 
 def test_a_double_layer_is_that_of_the_command_line_and_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     session = layered(tmp_path)
-    solution, grid = session.solution, session.grid
-    assert solution is not None and grid is not None
-    truss = solution.truss
+    assert session.solution is not None and session.grid is not None
+    truss = session.solution.truss
     assert set(truss.member_sets) == {TOP, BOTTOM, WEB} and truss.pinned
     figures = dict(structure_figures(session.state))
     assert [figures[name].split()[0] for name in (TOP, BOTTOM, WEB)] == [
@@ -59,13 +58,14 @@ def test_a_double_layer_is_that_of_the_command_line_and_kept(tmp_path: Path, mon
     assert again.state.structure_settings.double_layer == DEPTH and again.solution is not None
     assert again.files("structure", ".json")["structure.json"] == ours
     session.undo()
-    assert session.solution is None and session.state.structure_settings.double_layer == DEPTH
+    taken_back = session.state
+    assert taken_back.solution is None and taken_back.structure_settings.double_layer == DEPTH
     session.undo()
     assert session.state.structure_settings.double_layer == ""
     session.run_structure()
     done(session)
     single = session.state.solution
-    assert single is not None and len(single.truss.members) == len(grid.edges)
+    assert single is not None and len(single.truss.members) == len(session.grid.edges)
     assert not {TOP, BOTTOM, WEB} & dict(structure_figures(session.state)).keys()
 
 

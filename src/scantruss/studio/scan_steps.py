@@ -14,6 +14,7 @@ from ..runtime.progress import Progress
 from ..scan.cloud import PointCloud
 from ..scan.member_length import length_range, suggest_length
 from ..settings import Settings
+from .grid_files import changes_of_grid, is_grid_file, refuse_grid_without_scan
 from .opening import DATA_FOLDER, EXAMPLES, called, marks_of, next_free, read_whole
 from .project import read_project
 from .scan_parts import Cleaning, WholeScan, cleaning_of, part_of_scan
@@ -58,8 +59,21 @@ class ScanSteps(Steps):
             state, solved = read_project(path)
             self.begin(solved_again(state) if solved else state)
             return
+        refuse_grid_without_scan(path)
         cloud = read_whole(path)
         self._start(WholeScan(cloud, *marks_of(path, cloud)))
+
+    def _take_grid(self, name: str, path: Path) -> None:
+        """Take a saved grid of the scan that is open."""
+        turn = self._turn
+        changes = changes_of_grid(self.state, path)
+        with self._lock:
+            if turn != self._turn:
+                return
+            self._turn += 1
+            self.change(f"open {name}", **changes)
+        self._forget_features()
+        self.save()
 
     def open_upload(self, name: str, content: bytes) -> None:
         """Open a scan or a project that came through the page, as a step of the worker."""
@@ -75,6 +89,10 @@ class ScanSteps(Steps):
                     state, solved = read_project(path)
                     number, place = self._place_for(own)
                     self._open_state(f"open {own}", solved_again(state) if solved else state, number, place)
+                    return
+                if is_grid_file(path):
+                    progress("certificate", 0.5)
+                    self._take_grid(own, path)
                     return
                 cloud = read_whole(path)
                 classes, colors = marks_of(path, cloud)
@@ -111,6 +129,10 @@ class ScanSteps(Steps):
                 self._open_state(f"open {path.name}", taken, max(self._places) + 1, place)
                 return
             with called(name.strip(), path):
+                if is_grid_file(path):
+                    progress("certificate", 0.5)
+                    self._take_grid(path.name, path)
+                    return
                 cloud = read_whole(path)
             self._start(WholeScan(cloud, *marks_of(path, cloud)))
             self._make("quick", progress, live=True)

@@ -26,7 +26,8 @@ class ScanTab:
     def __init__(self, view: StudioView, gui: Any) -> None:
         self.view, session, step = view, view.session, view.step
         upload = gui.add_upload_button(
-            "Open a scan or project", hint="or drop a file on the page; at most 500 MB, a larger one by its path"
+            "Open a scan or project",
+            hint="or drop a file on the page, also a grid saved as .json over its scan; at most 500 MB, a larger one by its path",
         )
         with gui.add_folder("Open a path or an example", expand_by_default=session.cloud is None):
             self.path = gui.add_text("path", "", hint="of a file in the folder of the project")
