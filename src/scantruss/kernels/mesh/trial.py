@@ -13,9 +13,12 @@ from ..geometry.vectors import Vector, cross, dot, norm, row, subtract
 from ..surface.folds import FOLD_WEIGHT, chord_energy, fold_energy
 from ..surface.local_surface import CENTRE, HEIGHTS, NORMAL, TANGENT
 from .equalize import FOUR_ROOT_3
-from .grid import Net, is_line, target_length, wings
+from .grid import Net, target_length, wings
 
 OFF_PATCH = 0.33  # distance of the middle of a triangle from the patches of its nodes at which it has left them [desired length]
+SQUARED_COSINE_OF_FOLD = (
+    0.25  # square of the cosine of the angle between two triangles below which the member between them is folded
+)
 
 
 class Scratch(NamedTuple):
@@ -97,22 +100,29 @@ def put_back(net: Net, scratch: Scratch) -> None:
 
 
 @kernel
+def is_folded(one: Vector, other: Vector) -> bool:
+    """Whether two triangles with a common side and normals of any length meet at less than 60 degrees: sharp ridges do not."""
+    facing = dot(one, other)
+    return facing < 0.0 and facing * facing > SQUARED_COSINE_OF_FOLD * dot(one, one) * dot(other, other)
+
+
+@kernel
 def folds_outwards(net: Net, scratch: Scratch, v: int, a: int, b: int, normal: Vector) -> bool:
     """Whether triangle (v, a, b) with a normal is folded over the member a-b, whose ends are not in the neighbourhood of v."""
     beyond = wings(net, a, b)[0]
-    if beyond < 0 or is_line(net, a, b) or (beyond < v and scratch.held[beyond] == scratch.trial[0]):
-        return False  # on the boundary, a ridge, or counted from the other side
+    if beyond < 0 or (beyond < v and scratch.held[beyond] == scratch.trial[0]):
+        return False  # on the boundary, or counted from the other side
     p = row(net.nodes, a)
     other = cross(subtract(row(net.nodes, beyond), p), subtract(row(net.nodes, b), p))
-    return dot(normal, other) < 0.0
+    return is_folded(normal, other)
 
 
 @kernel
 def local_energy(net: Net, patches: np.ndarray, scratch: Scratch, length: float, weight: float) -> float:
     """Energy of all members and triangles with a node in the neighbourhood, each counted once, and 1 for each folded member.
 
-    A member is folded if its two triangles meet at less than 90 degrees; one of a line is not, as a ridge may be sharp. Members of which
-    only a triangle is in the neighbourhood count too, or two trials side by side could lower the energy in turn for ever.
+    A member is folded if its two triangles meet at less than 60 degrees. Members of which only a triangle is in the neighbourhood count
+    too, or two trials side by side could lower the energy in turn for ever.
     """
     nodes, held, stamp = net.nodes, scratch.held, scratch.trial[0]
     energy = 0.0
@@ -122,7 +132,7 @@ def local_energy(net: Net, patches: np.ndarray, scratch: Scratch, length: float,
         if d == 0:
             continue
         energy += fold_energy(patches, v, nodes[v, 0], nodes[v, 1], nodes[v, 2])
-        closed, line = net.is_open[v] == 0, net.line[v]
+        closed = net.is_open[v] == 0
         w = net.ring[v, d - 2 if closed else d - 1]
         cx, cy, cz = nodes[w, 0] - nodes[v, 0], nodes[w, 1] - nodes[v, 1], nodes[w, 2] - nodes[v, 2]
         cc = cx * cx + cy * cy + cz * cz
@@ -145,8 +155,8 @@ def local_energy(net: Net, patches: np.ndarray, scratch: Scratch, length: float,
             if at == 0 and not closed:
                 continue
             ux, uy, uz = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
-            if not skipped and tx * ux + ty * uy + tz * uz < 0.0:
-                energy += 1.0 - ((line >> (at - 1 if at > 0 else d - 1)) & 1)
+            if not skipped and is_folded((tx, ty, tz), (ux, uy, uz)):
+                energy += 1.0
             if skipped or counted or at < 0:
                 continue
             ex, ey, ez = cx - bx, cy - by, cz - bz
