@@ -62,15 +62,14 @@ def flips_that_pay(grid: Grid) -> dict[tuple[int, int], float]:
 
 
 def energy(grid: Grid, length: float, weight: float) -> float:
-    """Members, triangles and folds: members whose triangles meet at less than 60 degrees."""
+    """Members, triangles and folds."""
     total = 0.0
     for (a, b), third in wings(grid).items():
         p, q = grid.nodes[a], grid.nodes[b]
         total += weight * (float(np.linalg.norm(q - p)) / length - 1) ** 2
         if len(third) == 2:
             r, s = grid.nodes[third[0]], grid.nodes[third[1]]
-            one, other = np.cross(q - p, r - p), np.cross(s - p, q - p)
-            total += float(one @ other < -0.5 * np.linalg.norm(one) * np.linalg.norm(other))
+            total += float(np.cross(q - p, r - p) @ np.cross(s - p, q - p) < 0)
     return total + sum(1 - shape(*grid.nodes[t]) for t in grid.triangles)
 
 

@@ -16,9 +16,6 @@ from .equalize import FOUR_ROOT_3
 from .grid import Net, target_length, wings
 
 OFF_PATCH = 0.33  # distance of the middle of a triangle from the patches of its nodes at which it has left them [desired length]
-SQUARED_COSINE_OF_FOLD = (
-    0.25  # square of the cosine of the angle between two triangles below which the member between them is folded
-)
 
 
 class Scratch(NamedTuple):
@@ -100,13 +97,6 @@ def put_back(net: Net, scratch: Scratch) -> None:
 
 
 @kernel
-def is_folded(one: Vector, other: Vector) -> bool:
-    """Whether two triangles with a common side and normals of any length meet at less than 60 degrees: sharp ridges do not."""
-    facing = dot(one, other)
-    return facing < 0.0 and facing * facing > SQUARED_COSINE_OF_FOLD * dot(one, one) * dot(other, other)
-
-
-@kernel
 def folds_outwards(net: Net, scratch: Scratch, v: int, a: int, b: int, normal: Vector) -> bool:
     """Whether triangle (v, a, b) with a normal is folded over the member a-b, whose ends are not in the neighbourhood of v."""
     beyond = wings(net, a, b)[0]
@@ -114,14 +104,14 @@ def folds_outwards(net: Net, scratch: Scratch, v: int, a: int, b: int, normal: V
         return False  # on the boundary, or counted from the other side
     p = row(net.nodes, a)
     other = cross(subtract(row(net.nodes, beyond), p), subtract(row(net.nodes, b), p))
-    return is_folded(normal, other)
+    return dot(normal, other) < 0.0
 
 
 @kernel
 def local_energy(net: Net, patches: np.ndarray, scratch: Scratch, length: float, weight: float) -> float:
     """Energy of all members and triangles with a node in the neighbourhood, each counted once, and 1 for each folded member.
 
-    A member is folded if its two triangles meet at less than 60 degrees. Members of which only a triangle is in the neighbourhood count
+    A member is folded if its two triangles meet at less than 90 degrees. Members of which only a triangle is in the neighbourhood count
     too, or two trials side by side could lower the energy in turn for ever.
     """
     nodes, held, stamp = net.nodes, scratch.held, scratch.trial[0]
@@ -155,7 +145,7 @@ def local_energy(net: Net, patches: np.ndarray, scratch: Scratch, length: float,
             if at == 0 and not closed:
                 continue
             ux, uy, uz = by * cz - bz * cy, bz * cx - bx * cz, bx * cy - by * cx
-            if not skipped and is_folded((tx, ty, tz), (ux, uy, uz)):
+            if not skipped and tx * ux + ty * uy + tz * uz < 0.0:
                 energy += 1.0
             if skipped or counted or at < 0:
                 continue
