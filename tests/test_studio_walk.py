@@ -56,7 +56,15 @@ def test_what_is_refused_or_old_is_told_from_what_is(tmp_path: Path) -> None:
         page.wait_for_selector("text=length 60 m is too large")
         assert field(page, "exactly").input_value() == "60" and session.settings.length != 60
         page.click("button:has-text('See all')")
+        page.wait_for_selector(".studio-refused", state="detached")
         assert until(lambda: field(page, "exactly").input_value() == f"{session.settings.length:g}", 10)
+        tab(page, "Scan")
+        page.click("text=Crop")
+        say(page, "crop", "box:1,2")
+        page.locator("button:has-text('Crop')").last.click()
+        page.wait_for_selector(".studio-refused:has-text('crop must be')")
+        say(page, "crop", "box:0,0,9,9")
+        page.wait_for_selector(".studio-refused", state="detached")
         assert errors == []
 
 

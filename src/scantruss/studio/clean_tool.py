@@ -30,6 +30,7 @@ class CleanTool:
         )
         buttons = gui.add_button_group("red", ("Show what goes", "Keep all"), hint="duplicates go too")
         self.about = gui.add_markdown("")
+        view.corrects(self.distance, self.pieces)
         remove = gui.add_button("Remove what is red")
         self._drawn: Cleaning | None = None
         buttons.on_click(view.chosen(lambda way: self._show() if way == "Show what goes" else self._keep()))

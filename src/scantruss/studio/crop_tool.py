@@ -67,6 +67,7 @@ class CropTool:
         self._handles: list[Any] = []
         self._corners: list[tuple[float, float]] = []
         ways.on_click(view.chosen(lambda way: {"Box": self._box, "Polygon": self._polygon, "All": self._all}[way]()))
+        view.corrects(self.words)
         take.on_click(view.step(self._take))
         view.modes[CROP_MODE] = self._corner
 

@@ -33,6 +33,7 @@ class FixedNodes:
         self.words = gui.add_text("x, y, z", "", hint="in the frame of the scan, in its unit")
         ways = gui.add_button_group("typed", FIX_WAYS, hint="Add x, y, z, or move the chosen node there")
         self._balls = DraggedBalls(view, "/fixed", lambda number, place: self._set(tuple(place.tolist()), number))
+        view.corrects(self.words)
         by_click.on_click(view.step(lambda: setattr(view.click, "value", FIX_MODE)))
         view.modes[FIX_MODE] = self.place
         self.chosen.on_update(view.step(self._choose))

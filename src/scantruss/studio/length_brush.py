@@ -91,6 +91,7 @@ class LengthBrush:
         )
         self.usual = gui.add_markdown("")
         none = gui.add_button("No field", hint="one length everywhere")
+        view.corrects(self.length, self.radius)
         paint.on_click(view.step(lambda: setattr(view.click, "value", PAINT_MODE)))
         none.on_click(view.step(view.session.unpaint))
         view.modes[PAINT_MODE] = self._click

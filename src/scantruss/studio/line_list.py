@@ -39,6 +39,7 @@ class LineList:
         )
         self._points: list[np.ndarray] = []
         self._count = 0
+        view.corrects(self.words)
         draw.on_click(view.step(self._begin))
         ways.on_click(view.chosen(self._go_on))
         typed.on_click(view.chosen(self._typed))

@@ -77,6 +77,11 @@ class Presses:
         """Take a step when no more is typed into a text field."""
         self._typed.on_typed(field, step)
 
+    def corrects(self, *fields: Any) -> None:
+        """Say no more what was refused once somebody has typed into one of some fields, of which a press takes the text."""
+        for each in fields:
+            self.typed(each, lambda: None)
+
     def show_text(self, field: Any, text: str) -> None:
         """Write a text into a field, unless somebody is typing there."""
         self._typed.show(field, text)

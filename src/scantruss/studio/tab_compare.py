@@ -36,6 +36,7 @@ class CompareTab:
         self.taken = gui.add_button(TAKE.format("it"), disabled=True, hint="Undo takes that back")
         drop = gui.add_button("Forget that design")
         self.table = gui.add_html("")
+        view.corrects(self.name)
         keep.on_click(view.step(lambda: view.session.keep_design(self.name.value)))
         drop.on_click(view.step(self._drop))
         self.taken.on_click(view.step(lambda: view.session.take_design(self.other.value)))

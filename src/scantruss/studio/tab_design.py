@@ -71,8 +71,7 @@ class DesignTab:
             self.effort.value, self.prefer.value = settings.effort, settings.prefer
         if not session.message:  # else what was refused stands there
             self.view.show_text(self.length, f"{float(f'{state.main_length:.9g}'):g}")
-        if before is None or before.grid is not state.grid or before.is_live != state.is_live:
-            self._fill_grid(state)
+        self._fill_grid(state)
         for part in (self.cells, self.features, self.rows, self.brush, self.trade):
             part.fill(before, state)
 
@@ -85,6 +84,8 @@ class DesignTab:
             return
         quality, certificate = grid.quality, grid.certificate
         quick = " (quick preview)" if state.is_live else ""
+        if state.is_stale and self.view.session.message:  # which stands where this is said else
+            quick = " (before the last change)"
         self.figures.content = (
             f"{len(grid.nodes):,} nodes, {len(grid.edges):,} members{words_of_panels(grid)}{quick}\n\n"
             f"length {quality.length_mean:.4g}{unit}, CV {quality.length_cv:.4f}, G {quality.shape_mean:.4f}"

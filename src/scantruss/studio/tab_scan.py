@@ -49,6 +49,7 @@ class ScanTab:
             self.tape = Tape(view, gui)
         self._gui, self._boxes = gui, dict[int, Any]()
         upload.on_upload(view.chosen(lambda file: session.open_upload(file.name, file.content)))
+        view.corrects(self.path)
         by_path.on_click(step(lambda: session.open_path(self.path.value)))
         opened.on_click(step(lambda: session.open_example(self.example.value)))
         self.unit.on_update(step(lambda: session.set_unit("" if self.unit.value == UNKNOWN_UNIT else self.unit.value)))

@@ -37,6 +37,7 @@ class TradeTool:
         self.about = gui.add_markdown("", visible=False)
         self._drawn: tuple[Any, ...] = ()
         self.parts.on_update(view.step(self._choose))
+        view.corrects(self.tolerance)
         find.on_click(view.step(self._find))
         view.typed(self.number, self._take)
 
