@@ -48,7 +48,7 @@ def test_a_person_makes_quads_and_a_double_layer(tmp_path: Path) -> None:
         with_diagonals = at_rest(page)
         tab(page, "Design")
         choose(page, "triangle", "quad")
-        page.wait_for_selector("text=/ quads .quick, not saved/")
+        page.wait_for_selector("text=/ quads .quick preview/")
         field(page, "planar panels").check()
         page.click("button:has-text('Generate')")
         page.wait_for_selector("text=undo: generate")

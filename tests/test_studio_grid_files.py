@@ -23,7 +23,8 @@ def test_a_saved_grid_is_taken_with_its_settings(tmp_path: Path) -> None:
     done(session)
     assert session.grid is not None and session.files("grid", ".json")["grid.json"] == saved
     assert session.settings.length == 2.5 and session.grid.settings == grid.settings
-    assert not session.state.is_stale and not session.state.is_live and session.history.words[0] == "open kept.json"
+    taken = session.state
+    assert not taken.is_stale and not taken.is_live and session.history.words[0] == "open kept.json"
     again = Session()
     again.open(tmp_path / "dome.scantruss")
     assert again.files("grid", ".json")["grid.json"] == saved
