@@ -66,6 +66,18 @@ def test_sizing_and_modes_are_those_of_the_command_line(tmp_path: Path, monkeypa
     assert again.state.report is not None and again.state.report.weights == report.weights
 
 
+def test_figures_say_what_they_are_of_and_absurd_ones_are_cut(tmp_path: Path) -> None:
+    session = session_of_dome(tmp_path, 6.0)
+    session.set_structure(supports="boundary", section="CHS114.3x5", loads="self,snow:1e9kN/m2")
+    session.run_structure()
+    done(session)
+    found = dict(structure_figures(session.state))
+    assert found["supports"] == "boundary, pinned" and found["section"] == "CHS114.3x5 S355"
+    assert found["loads"] == "self, snow:1e9kN/m2" and found["utilization"] == "> 1000"
+    assert session.state.report is not None
+    assert any("too large for a design" in words for words in session.state.report.warnings)
+
+
 def test_the_page_says_whether_buckling_was_looked_at(tmp_path: Path) -> None:
     session = session_of_dome(tmp_path, 6.0)
     for modes, said in ((0, "not looked at; set buckling modes to 1"), (1, "ULS")):

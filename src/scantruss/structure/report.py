@@ -21,6 +21,8 @@ from .results import CaseResult, Solution
 from .sizing import SizingRound
 from .truss import Truss
 
+SOFTEST = 3.0  # span over displacement, rounded, below which its number says nothing
+
 
 @dataclass(frozen=True)
 class CaseFigures:
@@ -229,9 +231,10 @@ def _limits(truss: Truss, figures: Sequence[CaseFigures], checks: MemberChecks) 
     most = max(service, key=lambda case: case.displacement_max)
     span = span_of(truss)
     if span > 0 and most.displacement_max > span / checks.deflection:
-        ratio = span / most.displacement_max if most.displacement_max else math.inf
+        ratio = span / most.displacement_max
+        words = f"span/{ratio:.0f}, more than" if ratio > SOFTEST else "too large for a design: it may be"
         warnings.append(
-            f"the displacement of {words_of_number(1e3 * most.displacement_max, 3)} mm under {most.name} is span/{ratio:.0f}, more than"
+            f"the displacement of {words_of_number(1e3 * most.displacement_max, 3)} mm under {most.name} is {words}"
             f" span/{checks.deflection:g} of the span {span:.3g} m"
         )
     return warnings

@@ -10,6 +10,7 @@ import numpy as np
 from ..check.distances import distances_to_grid
 from ..errors import InputError, words_of_number
 from ..grid.grid import Grid
+from ..structure.checks import use_words
 from .layers_tool import figures_of_layers
 from .state import NO_GRID, Design, StudioState
 from .support_places import supports_on
@@ -62,9 +63,12 @@ def structure_figures(state: StudioState) -> list[tuple[str, str]]:
     values = report.to_dict()
     service = [case for case in report.cases if case.state == "SLS"] or report.cases
     moves = max(service, key=lambda case: case.displacement_max)
-    used = values["utilization_max"]
+    used, asked = values["utilization_max"], state.shown_structure
     rows = [
-        ("utilization", "-" if used is None else f"{used:.2f}"),
+        ("supports", f"{asked.supports}, {asked.support_type}"),
+        ("section", f"{asked.section} {asked.material}"),
+        ("loads", ", ".join(map(str, asked.loads))),
+        ("utilization", use_words(used)),
         ("displacement", f"{words_of_number(1e3 * moves.displacement_max, 3)} mm under {moves.name}"),
         ("axial forces", f"{values['force_min'] / 1e3:.4g} to {values['force_max'] / 1e3:.4g} kN"),
         ("mass without nodes", f"{report.truss.mass:,.0f} kg"),

@@ -43,6 +43,7 @@ class RowsTool:
     def _start(self) -> None:
         self._begin = None
         self.view.click.value = ROWS_MODE
+        self.view.say("click where the arrow begins, then where it ends")
 
     def _click(self, origin: np.ndarray, ahead: np.ndarray) -> None:
         place = clicked_point(self.view, origin, ahead)
@@ -50,6 +51,7 @@ class RowsTool:
             self._begin = place
             at = self.view.frame.to_scene(place[None])
             self.view.scene.points("/rows", at, np.array(ROWS_COLOR, np.uint8), 0.12)
+            self.view.say("now click where the arrow ends")
             return
         begin, self._begin = self._begin, None
         self.view.click.value = self.view.clicks[0]
