@@ -8,13 +8,12 @@ import numpy as np
 import pytest
 from small_clouds import sheet
 from small_grids import make_grid
-from steps import steps_of
 from typed import known
 
 import scantruss as st
 from scantruss.boundary.find import Boundary, Loop
 from scantruss.check.boundaries import places_aside
-from scantruss.check.certify import certified, certify
+from scantruss.check.certify import certify, passed_grid
 from scantruss.check.doubtful import doubtful_places, zigzags
 from scantruss.check.gaps import bridged_gaps
 from scantruss.check.limits import places_to_look_at
@@ -219,9 +218,8 @@ def test_a_corner_that_is_cut_off_is_a_warning_with_its_place() -> None:
     assert {"aside", "cut"} <= set(kinds)
 
 
-def test_a_refusal_names_the_setting_that_accepts_it_only_where_that_is_enough(monkeypatch: pytest.MonkeyPatch) -> None:
-    samples, grid = scanned(sheet(13, 8, 0.08), lattice())
-    boundary = steps_of(st.PointCloud.from_array(sheet(13, 8, 0.08)), SETTINGS).boundary
+def test_a_refusal_names_the_setting_that_accepts_it_only_where_that_is_enough() -> None:
+    grid = lattice()
     base = Certificate("", 0.5, True, True, 1, 1, 1, 1, 1, 0)
     cover, angle, short = (
         Fault("cover", "leaves out 12.1% of the scan"),
@@ -247,7 +245,6 @@ def test_a_refusal_names_the_setting_that_accepts_it_only_where_that_is_enough(m
         ),
     ):
         found = replace(base, faults=faults, missing=missing)
-        monkeypatch.setattr("scantruss.check.certify.certify", lambda *_, found=found: found)
         with pytest.raises(CertificateError) as refused:
-            certified(grid, samples, boundary, SETTINGS)
+            passed_grid(grid.replace(certificate=found))
         assert str(refused.value).startswith(said)

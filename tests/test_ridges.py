@@ -14,7 +14,7 @@ from steps import steps_of
 from typed import known
 
 from scantruss import Grid, PointCloud, Settings, candidates, grid_from_points
-from scantruss.check.certify import checked
+from scantruss.check.certify import Judged, judge
 from scantruss.constraints.find import wanted_ridges
 from scantruss.constraints.fold_tracing import Tracer, is_even, parts_of
 from scantruss.constraints.ridge_ends import Ridge, join_ends
@@ -133,12 +133,12 @@ def _origin(points: np.ndarray) -> np.ndarray:
 def test_a_grid_that_fails_with_its_ridges_is_made_without(monkeypatch: pytest.MonkeyPatch) -> None:
     shape = make("gable", 20_000)
 
-    def refuse_lines(grid: Grid, *others: Any) -> Grid:
+    def refuse_lines(grid: Grid, *others: Any) -> Judged:
         if len(grid.lines):
             raise FrontError("no", grid)
-        return checked(grid, *others)
+        return judge(grid, *others)
 
-    monkeypatch.setattr(candidates, "checked", refuse_lines)
+    monkeypatch.setattr(candidates, "judge", refuse_lines)
     grid = grid_from_points(shape.points, Settings(length=shape.length))
     assert len(grid.lines) == 0 and known(grid.settings).ridge_angle == 0.0
 

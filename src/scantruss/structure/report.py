@@ -232,7 +232,7 @@ def _limits(truss: Truss, figures: Sequence[CaseFigures], checks: MemberChecks) 
     span = span_of(truss)
     if span > 0 and most.displacement_max > span / checks.deflection:
         ratio = span / most.displacement_max
-        words = f"span/{ratio:.0f}, more than" if ratio > SOFTEST else "too large for a design: it may be"
+        words = f"span/{ratio:.0f}, more than" if ratio > SOFTEST else "too large for a design, more than"
         warnings.append(
             f"the displacement of {words_of_number(1e3 * most.displacement_max, 3)} mm under {most.name} is {words}"
             f" span/{checks.deflection:g} of the span {span:.3g} m"
