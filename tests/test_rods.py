@@ -15,7 +15,6 @@ from scantruss.check.distances import boxes_of
 from scantruss.cli.main import main
 from scantruss.cli.shared import box_around
 from scantruss.kernels.surface.rods import spreads_around
-from scantruss.scan.clean.outliers import some_stand_alone
 from scantruss.scan.member_length import length_range
 from scantruss.surface.chosen_samples import ROD
 from scantruss.surface.linked_samples import link_samples
@@ -170,16 +169,6 @@ def test_rods_are_looked_for_from_a_few_spacings_up_to_the_length_asked_for() ->
     assert lengths[0] == pytest.approx(1.2) and lengths[-1] == 5.0
     assert steps.max() == pytest.approx(LENGTH_STEP) and steps.min() > 1.0
     assert lengths_of_rods(5.0, 0.0) == [5.0]
-
-
-def test_poles_by_themselves_are_no_outliers_to_the_grid_where_cleaning_finds_none(
-    scaffolded: tuple[np.ndarray, np.ndarray],
-) -> None:
-    """Samples along a pole have few others near them, but no point stands alone."""
-    cloud = st.PointCloud.from_array(scaffolded[0])
-    assert not some_stand_alone(cloud.points, cloud.spacing)
-    for spacings in (12, 16, 20, 24, 40):
-        assert sample_surface(cloud, st.Settings(length=spacings * cloud.spacing)).outliers == 0
 
 
 @pytest.mark.parametrize("length", [1.0, 3.0])

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..scan.clean.outliers import has_outliers, judge_points, some_stand_alone
+from ..scan.clean.outliers import has_outliers, judge_points
 from ..scan.cloud import Bounds, bounds_of
 from ..settings import SAMPLE_SPACING, SMOOTH_SAMPLE_SPACING, Settings
 from .given_normals import GivenNormals
@@ -132,8 +132,6 @@ def usual_samples(
     found = link_samples(some, radius, length, spacing, given)
     if asked.outlier_distance and (asked.judge_always or has_outliers(found.neighbors)):
         outlier, sparse = judge_points(points, asked.outlier_distance, length)
-        if not asked.judge_always and not some_stand_alone(points, spacing):  # only samples do, as along a pole
-            outlier[:] = False
         if outlier.any() or sparse.any():
             judged = np.where(outlier, OUTLIER, np.where(sparse, SPARSE_POINT, KEPT)).astype(np.uint8)
             points = np.ascontiguousarray(points[judged == KEPT])
