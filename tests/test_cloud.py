@@ -227,6 +227,18 @@ def test_the_gap_is_the_median_distance_to_the_sixth_neighbour(count: int) -> No
     assert PointCloud.from_array(points).gap == pytest.approx(float(np.median(sixth**2)) ** 0.5, rel=close)
 
 
+@pytest.mark.parametrize("times", [1, 3])
+def test_a_quick_look_counts_places_with_six_others_near(times: int) -> None:
+    points = bowl(16)
+    squares = ((points[:, None] - points) ** 2).sum(axis=2)
+    near = np.sort(np.sqrt(squares), axis=1)[:, 6]
+    repeated = np.repeat(points, times, axis=0)
+    for reach in np.quantile(near, [0.0, 0.2, 0.5, 0.8, 1.0]) * (1.0 + 1e-9):
+        looked = np.linspace(0, len(repeated) - 1, min(len(repeated), clouds.POINTS_FOR_SHARE)).astype(np.int64)
+        expected = float((near[looked // times] <= reach).mean())
+        assert clouds.share_with_six_near(repeated, float(reach)) == pytest.approx(expected, abs=1e-12)
+
+
 @pytest.mark.parametrize("times", [2, 4])
 def test_points_that_are_stored_again_and_again_do_not_narrow_the_gap(times: int) -> None:
     points = bowl(16)
