@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from marks import compiled_only
@@ -11,12 +13,20 @@ from typed import known
 
 import scantruss as st
 from scantruss import candidates
-from scantruss.errors import Place
 from scantruss.front.advance import advance_front
 from scantruss.front.orientation_field import orientation_fields
 from scantruss.improve.optimize import improve_first, improve_last
-from scantruss.improve.tips import FARTHEST_TIP, LEAST_TIP, TIPS_APART, find_tips, reach_tips
+from scantruss.improve.tips import (
+    FARTHEST_TIP,
+    LEAST_TIP,
+    FAULT_REACH,
+    TIPS_APART,
+    find_tips,
+    put_on_tips,
+    suspects_apart,
+)
 from scantruss.improve.working_mesh import WorkingMesh
+from scantruss.kernels.mesh.grid import AT_REST
 from scantruss.surface.samples import SurfaceSamples
 
 BALL = 3.5  # radius [member]
@@ -70,19 +80,65 @@ def test_tips_are_the_farthest_places() -> None:
     assert np.linalg.norm(far[:, None] - tips, axis=2).min(axis=1).max() < TIPS_APART
     apart = np.linalg.norm(tips[:, None] - tips, axis=2)[np.triu_indices(len(tips), 1)]
     assert (apart >= TIPS_APART).all()
-    where: list[Place] = [(float(x), float(y), float(z)) for x, y, z in tips + samples.origin]
-    assert find_tips(mesh, front, samples, where) == []
+    assert find_tips(mesh, front, samples, list(tips)) == []  # all given up
 
 
 @compiled_only
 def test_a_node_is_put_on_each_tip_that_is_reached() -> None:
     mesh, front, samples = improved(eared_ball())
     tips, fixed = find_tips(mesh, front, samples), mesh.fixed.copy()
-    reached = reach_tips(mesh, front, samples)
+    reached = put_on_tips(mesh, tips)
     nodes = mesh.net.nodes[mesh.net.degree > 0]
     on_tip = [np.linalg.norm(nodes - tip, axis=1).min() < 1e-9 for tip in tips]
     assert sum(on_tip) == reached > 0
     assert (mesh.fixed == fixed).all()  # a tip is no support
+
+
+def test_tips_near_a_fault_are_told_from_those_that_did_nothing() -> None:
+    rng = np.random.default_rng(5)
+    for _ in range(50):
+        tips = list(rng.uniform(0.0, 12.0, (rng.integers(2, 9), 3)))
+        faults = list(rng.uniform(0.0, 12.0, (rng.integers(0, 3), 3)))
+        harmless, suspects = suspects_apart(tips, faults, 1.5)
+        near = [any(np.linalg.norm(tip - place) < FAULT_REACH * 1.5 for place in faults) for tip in tips]
+        assert 0 < len(harmless) < len(tips)
+        assert {id(tip) for tip in (*harmless, *suspects)} == {id(tip) for tip in tips}
+        if 0 < sum(near) < len(tips):
+            assert [id(tip) for tip in suspects] == [
+                id(tip) for tip, is_near in zip(tips, near, strict=True) if is_near
+            ]
+
+
+@compiled_only
+def test_a_tip_that_spoils_the_grid_is_given_up_and_the_others_are_reached(monkeypatch: pytest.MonkeyPatch) -> None:
+    points, settings = eared_ball(), st.Settings(length=1.0)
+    tips: list[np.ndarray] = []
+
+    def first_tips(*words: Any) -> list[np.ndarray]:
+        tips.extend(found := find_tips(*words))
+        return found
+
+    spoilt: list[bool] = []
+
+    def spoil(mesh: WorkingMesh, some: list[np.ndarray]) -> int:
+        """Put nodes on tips; with the first of all among them, a node lands where it tears the grid."""
+        placed = put_on_tips(mesh, some)
+        spoilt.append(any((tip == tips[0]).all() for tip in some))
+        if spoilt[-1]:
+            free = np.flatnonzero((mesh.net.degree > 0) & (mesh.net.is_open == 0))
+            mesh.net.nodes[free[0]] += 4.0
+            mesh.net.kind[free[0]] = AT_REST
+        return placed
+
+    monkeypatch.setattr("scantruss.candidates.find_tips", first_tips)
+    monkeypatch.setattr("scantruss.candidates.put_on_tips", spoil)
+    grid = st.grid_from_points(points, settings)
+    assert known(grid.certificate).passed
+    assert any(spoilt)
+    assert not all(spoilt)
+    nodes = grid.nodes
+    reached = [np.linalg.norm(nodes - tip, axis=1).min() < 0.5 for tip in tips]
+    assert any(reached[1:])
 
 
 @compiled_only

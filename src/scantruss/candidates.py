@@ -7,14 +7,17 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from .attempts import VERY_ROUGH_SCAN
 from .check.certify import Judged, judge, passed_grid
-from .errors import FrontError, Place
+from .errors import FrontError
 from .front.advance import advance_front
 from .front.orientation_field import Field, orientation_fields
 from .improve.equalize import energy_of_node
-from .improve.optimize import improve_first, improve_last, searched_again, with_tips
+from .improve.optimize import improve_first, improve_last, put_down, searched_again
 from .improve.rings import finish_rings
+from .improve.tips import find_tips, put_on_tips, suspects_apart
 from .runtime.parallel import threaded_map
 from .runtime.progress import Progress, WatchedProgress, seer_of
 from .surface.scratch import with_own_scratch
@@ -32,7 +35,6 @@ FULLY_IMPROVED = {"quick": 1, "normal": 1, "best": 3}  # fronts that are improve
 MISSING_ENERGY, DISTANCE_ENERGY, TIPS_ENERGY = 4.0, 0.1, 0.3
 MISSED_MORE = 0.002  # share of the scan that the grid of a longer search may miss beyond that of a shorter one
 TURNS_OF_TIPS = 5  # times that nodes are put on tips
-TIMES_OF_A_FAULT = 2  # times that tips are given up near the same fault, ever farther around
 MOST_MISSED = 0.2  # largest share of the scan that a grid may miss where they are put on tips
 TURNS_OF_SEARCH = 12  # times that the grid of effort `normal` is searched again where none of `best` is better
 POOR_SHAPE = 0.4  # shape quality of its worst triangle below which a grid is poor: more finalists are tried
@@ -235,40 +237,56 @@ def reach_tips_of(
 ) -> None:
     """Put nodes on the tips of the scan that a grid misses, as long as it is better for it and nothing else goes wrong.
 
-    Each turn either keeps the nodes on some tips, beside which there may be more, or gives up the tips near a fault that came of them.
-    In the end the grid is searched again.
+    Each turn finds those that the grid misses by then. In the end the grid is searched again.
     """
     mesh, of_scan = candidate.mesh, (candidate.front, samples, constraints, candidate.settings)
+    given_up: list[np.ndarray] = []
 
-    def try_to_take(grid: Grid, cost: float) -> list[Place] | None:
-        """Take the grid that the mesh has become where it is better than that of a cost; else return the places of its faults."""
+    def judged(grid: Grid) -> Judged:
+        return judge(finish_rings(grid, boundary).replace(settings=settings), samples, boundary, settings)
+
+    def reach(tips: Sequence[np.ndarray]) -> Judged | None:
+        """Put nodes on the tips where nothing goes wrong, and give up the others; the grid then, None where it is as before.
+
+        Tips near a fault are tried one by one. Ends: each call has fewer tips than the one that made it.
+        """
+        kept = mesh.copied()
+        if put_on_tips(mesh, tips):
+            now = judged(put_down(mesh, *of_scan))
+            if misses_at_most(now.checked_grid, MOST_MISSED):
+                return now
+            mesh.restore(kept)
+            if len(tips) > 1:
+                faults = [np.array(fault.where) - samples.origin for fault in now.certificate.faults if fault.where]
+                harmless, suspects = suspects_apart(tips, faults, mesh.length)
+                found = reach(harmless)
+                for tip in suspects:
+                    found = reach([tip]) or found
+                return found
+        given_up.extend(tips)
+        return None
+
+    def is_taken(now: Judged, cost: float) -> bool:
+        """Take the grid that the mesh has become where it passes as far and is better than one of some cost."""
         before = candidate.judged
         assert before is not None
-        now = judge(finish_rings(grid, boundary).replace(settings=settings), samples, boundary, settings)
         candidate.take(now)
-        if misses_at_most(grid_of(candidate), MOST_MISSED) and candidate.cost_of_tips < cost:
-            return None
-        candidate.take(before)
-        faults = now.certificate.faults
-        return [fault.where for fault in faults if fault.where and fault.kind != "cover"]
+        better = misses_at_most(grid_of(candidate), MOST_MISSED) and candidate.cost_of_tips < cost
+        if not better:
+            candidate.take(before)
+        return better
 
-    given_up: list[Place] = []
     reached = False
     for _ in range(TURNS_OF_TIPS if settings.method == "default" else 0):
         kept, cost = mesh.copied(), candidate.cost_of_tips
-        grid = with_tips(mesh, *of_scan, given_up)
-        places = try_to_take(grid, cost) if grid is not None else []
-        if places is None:
-            reached = True
-            continue
-        mesh.restore(kept)
-        again = [place for place in places if given_up.count(place) < TIMES_OF_A_FAULT]
-        if not again:
+        now = reach(find_tips(mesh, candidate.front, samples, given_up))
+        if now is None or not is_taken(now, cost):
+            mesh.restore(kept)
             break
-        given_up += again
+        reached = True
     if reached and settings.effort != "quick":
         kept, cost = mesh.copied(), candidate.cost_of_tips
-        if try_to_take(searched_again(mesh, *of_scan), cost) is not None:
+        if not is_taken(judged(searched_again(mesh, *of_scan)), cost):
             mesh.restore(kept)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,13 +20,11 @@ from .off_scan import put_on_scan
 from .perturbation import search_widely
 from .sliding_nodes import with_boundary_members, with_line_sets
 from .smoothing import smooth
-from .tips import reach_tips
 from .working_mesh import WorkingMesh
 
 if TYPE_CHECKING:
     from ..boundary.find import Boundary
     from ..constraints.find import Constraints
-    from ..errors import Place
     from ..settings import Settings
     from ..surface.samples import SurfaceSamples
 
@@ -133,23 +131,6 @@ def improve_last(
     if settings.method == "default":
         search_widely(mesh, settings.effort, report)
         fix_nodes(mesh, constraints.positions)
-    return put_down(mesh, front, samples, constraints, settings)
-
-
-def with_tips(
-    mesh: WorkingMesh,
-    front: Grid,
-    samples: SurfaceSamples,
-    constraints: Constraints,
-    settings: Settings,
-    faults: Sequence[Place] = (),
-) -> Grid | None:
-    """Return the grid of a mesh that was put down, with nodes on the tips of the scan; None where it has no more tips.
-
-    faults : places [scan unit] where such grids failed
-    """
-    if not reach_tips(mesh, front, samples, faults):
-        return None
     return put_down(mesh, front, samples, constraints, settings)
 
 

@@ -7,7 +7,6 @@ position does.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -15,13 +14,11 @@ import numpy as np
 
 from ..check.distances import distances_to_grid
 from ..kernels.boundary.curves import nearest_on_curves
-from ..kernels.mesh.trial import Scratch
 from .equalize import energy_of_grid, new_scratch
 from .fixed_nodes import take_place, ways_to_place
 from .working_mesh import WorkingMesh, close_net
 
 if TYPE_CHECKING:
-    from ..errors import Place
     from ..grid.grid import Grid
     from ..surface.samples import SurfaceSamples
 
@@ -29,14 +26,20 @@ LEAST_TIP = 0.32  # distance of a tip from the grid, at least [member lengths]
 FARTHEST_TIP = 1.2  # what is farther away is no tip but a part without a grid [member lengths]
 TIPS_APART = 1.0  # least distance between two tips [member lengths]
 TIP_TO_BOUNDARY = 0.5  # distance from the boundary within which no tip is looked for [member lengths]
-# distance from a fault within which tips are given up, for each time that it came up [member lengths]
-GIVEN_UP_WITHIN = 1.5
+FAULT_REACH = 2.0  # distance from a fault within which a node on a tip may have caused it [member lengths]
 MOST_TIPS = 40  # most tips at a time, the farthest first
 ENERGY_OF_TIP = 2.0  # most energy that a node on a tip may cost
 
 
-def reach_tips(mesh: WorkingMesh, front: Grid, samples: SurfaceSamples, faults: Sequence[Place] = ()) -> int:
-    """Put nodes on the tips of a scan, where they stay at rest; returns how many.
+def put_on_tips(mesh: WorkingMesh, tips: Sequence[np.ndarray]) -> int:
+    """Put nodes on tips (3,) of a scan, where they stay while the grid around settles; returns how many."""
+    return sum(_reach(mesh, tip) for tip in tips)
+
+
+def find_tips(
+    mesh: WorkingMesh, front: Grid, samples: SurfaceSamples, given_up: Sequence[np.ndarray] = ()
+) -> list[np.ndarray]:
+    """Return the samples (3,) that lie farthest from the grid around them, the farthest first.
 
     Parameters
     ----------
@@ -44,18 +47,9 @@ def reach_tips(mesh: WorkingMesh, front: Grid, samples: SurfaceSamples, faults: 
     front : Grid
         What the mesh was opened from.
     samples : SurfaceSamples
-    faults : places [scan unit], optional
-        Where grids failed whose tips were reached: there they are given up, farther around where the same place came up again.
+    given_up : arrays (3,), optional
+        Tips that no node can be put on, beside which none is looked for.
     """
-    scratch = new_scratch(mesh)
-    scratch.tried[:] = 1
-    return sum(_reach(mesh, scratch, place) for place in find_tips(mesh, front, samples, faults))
-
-
-def find_tips(
-    mesh: WorkingMesh, front: Grid, samples: SurfaceSamples, faults: Sequence[Place] = ()
-) -> list[np.ndarray]:
-    """Return the samples (3,) that lie farthest from the grid around them, the farthest first."""
     measured = samples.kept.copy()
     measured[samples.measured :] = False
     places = samples.surface.mean[measured]
@@ -64,16 +58,30 @@ def find_tips(
     off = distances_to_grid(places, grid, mesh.length)[0] / local
     order = np.argsort(-off, kind="stable")
     order = order[(off[order] >= LEAST_TIP) & (off[order] <= FARTHEST_TIP)]
-    given_up = [(np.array(fault) - samples.origin, times) for fault, times in Counter(faults).items()]
     tips: list[np.ndarray] = []
     for place, size in zip(places[order], local[order], strict=True):
         if len(tips) == MOST_TIPS:
             break
-        near = [np.linalg.norm(place - tip) < TIPS_APART * size for tip in tips]
-        near += [np.linalg.norm(place - fault) < times * GIVEN_UP_WITHIN * size for fault, times in given_up]
-        if not any(near) and not _is_at_boundary(mesh, place, TIP_TO_BOUNDARY * size):
+        near = any(np.linalg.norm(place - tip) < TIPS_APART * size for tip in (*tips, *given_up))
+        if not near and not _is_at_boundary(mesh, place, TIP_TO_BOUNDARY * size):
             tips.append(place)
     return tips
+
+
+def suspects_apart(
+    tips: Sequence[np.ndarray], faults: Sequence[np.ndarray], length: float
+) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """Return the tips that have nothing to do with faults at some places (3,), and the others: fewer in each than there were.
+
+    Where the places do not tell, these are the nearer and the farther half of them.
+    """
+    away = [min((float(np.linalg.norm(tip - place)) for place in faults), default=np.inf) for tip in tips]
+    suspect = [distance < FAULT_REACH * length for distance in away]
+    if all(suspect) or not any(suspect):
+        suspect = [k >= len(tips) // 2 for k in range(len(tips))]
+    return [tip for tip, is_one in zip(tips, suspect, strict=True) if not is_one], [
+        tip for tip, is_one in zip(tips, suspect, strict=True) if is_one
+    ]
 
 
 def _is_at_boundary(mesh: WorkingMesh, place: np.ndarray, reach: float) -> bool:
@@ -82,8 +90,10 @@ def _is_at_boundary(mesh: WorkingMesh, place: np.ndarray, reach: float) -> bool:
     return bool(curve >= 0 and distance < reach)
 
 
-def _reach(mesh: WorkingMesh, scratch: Scratch, place: np.ndarray) -> bool:
+def _reach(mesh: WorkingMesh, place: np.ndarray) -> bool:
     """Put a node on a tip in the way that costs the least energy; whether it costs little enough, else all is as before."""
+    scratch = new_scratch(mesh)
+    scratch.tried[:] = 1
     start, best, least = mesh.copied(), None, energy_of_grid(mesh, scratch) + ENERGY_OF_TIP
     for way in ways_to_place(mesh, place):
         mesh.restore(start)
