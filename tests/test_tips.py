@@ -19,7 +19,7 @@ from scantruss.improve.optimize import improve_first, improve_last
 from scantruss.improve.tips import (
     FARTHEST_TIP,
     LEAST_TIP,
-    FAULT_REACH,
+    SUSPECT_REACH,
     TIPS_APART,
     find_tips,
     put_on_tips,
@@ -100,7 +100,7 @@ def test_tips_near_a_fault_are_told_from_those_that_did_nothing() -> None:
         tips = list(rng.uniform(0.0, 12.0, (rng.integers(2, 9), 3)))
         faults = list(rng.uniform(0.0, 12.0, (rng.integers(0, 3), 3)))
         harmless, suspects = suspects_apart(tips, faults, 1.5)
-        near = [any(np.linalg.norm(tip - place) < FAULT_REACH * 1.5 for place in faults) for tip in tips]
+        near = [any(np.linalg.norm(tip - place) < SUSPECT_REACH * 1.5 for place in faults) for tip in tips]
         assert 0 < len(harmless) < len(tips)
         assert {id(tip) for tip in (*harmless, *suspects)} == {id(tip) for tip in tips}
         if 0 < sum(near) < len(tips):

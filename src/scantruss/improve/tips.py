@@ -26,7 +26,7 @@ LEAST_TIP = 0.32  # distance of a tip from the grid, at least [member lengths]
 FARTHEST_TIP = 1.2  # what is farther away is no tip but a part without a grid [member lengths]
 TIPS_APART = 1.0  # least distance between two tips [member lengths]
 TIP_TO_BOUNDARY = 0.5  # distance from the boundary within which no tip is looked for [member lengths]
-FAULT_REACH = 2.0  # distance from a fault within which a node on a tip may have caused it [member lengths]
+SUSPECT_REACH = 2.0  # distance from a fault within which a node on a tip may have caused it [member lengths]
 MOST_TIPS = 40  # most tips at a time, the farthest first
 ENERGY_OF_TIP = 2.0  # most energy that a node on a tip may cost
 
@@ -76,7 +76,7 @@ def suspects_apart(
     Where the places do not tell, these are the nearer and the farther half of them.
     """
     away = [min((float(np.linalg.norm(tip - place)) for place in faults), default=np.inf) for tip in tips]
-    suspect = [distance < FAULT_REACH * length for distance in away]
+    suspect = [distance < SUSPECT_REACH * length for distance in away]
     if all(suspect) or not any(suspect):
         suspect = [k >= len(tips) // 2 for k in range(len(tips))]
     return [tip for tip, is_one in zip(tips, suspect, strict=True) if not is_one], [
