@@ -186,12 +186,12 @@ def processes_of(group: int) -> list[str]:
 
 
 @pytest.mark.skipif(not hasattr(os, "killpg") or not shutil.which("ps"), reason="no groups of processes here")
-@pytest.mark.parametrize("command", ["thin", "sweep"])
 @pytest.mark.parametrize(
-    ("number", "wait", "status", "line"),
+    ("command", "number", "wait", "status", "line"),
     [
-        *((signal.SIGINT, wait, 130, "interrupted; nothing was written") for wait in (0.0, 0.1, 0.3, 0.8)),
-        (signal.SIGTERM, 0.1, 143, "stopped; nothing was written"),
+        *(("thin", signal.SIGINT, wait, 130, "interrupted; nothing was written") for wait in (0.0, 0.1, 0.3, 0.8)),
+        *(("sweep", signal.SIGINT, wait, 130, "interrupted; nothing was written") for wait in (0.0, 0.3)),
+        *((command, signal.SIGTERM, 0.1, 143, "stopped; nothing was written") for command in ("thin", "sweep")),
     ],
 )
 def test_processes_stopped_while_they_start_leave_one_line_and_nothing_else(

@@ -89,7 +89,7 @@ def test_a_scan_that_folds_over_gets_a_grid_of_its_mean_surface_and_the_settings
     inner = np.abs((grid.nodes + grid.origin)[:, :2]).max(axis=1) < 1.8
     assert grid.nodes[inner, 2].std() < 0.03 and abs(found.node_scatter - points[:, 2].std()) < 0.05
     with pytest.raises(st.ScanTrussError):
-        st.grid_from_points(points, settings.replace(smooth_scale=0.0))
+        st.grid_from_points(folded(2.0), settings.replace(smooth_scale=0.0))
 
 
 def test_two_layers_that_became_one_are_still_reported() -> None:
