@@ -168,6 +168,20 @@ def test_what_is_rounded_off_by_a_quarter_of_a_member_is_a_warning() -> None:
     assert "rounded" not in {warning.kind for warning in certify(grid, samples, NOTHING, SETTINGS).warnings}
 
 
+def test_what_a_grid_of_the_mean_surface_rounds_off_is_said_as_far_as_it_is_no_roughness() -> None:
+    points = sheet(13, 8, 0.08)
+    points[:, 2] += 0.4 * np.exp(-(points[:, 0] ** 2 + points[:, 1] ** 2) / 2.0)
+    samples, grid = scanned(points, lattice())
+    bump = replace(samples, moved=1.0)
+    assert "rounded" in {warning.kind for warning in certify(grid, bump, NOTHING, SETTINGS).warnings}
+    rough = sheet(13, 8, 0.08)
+    rough[:, 2] += np.random.default_rng(4).choice([-0.28, 0.28], len(rough))
+    samples, grid = scanned(rough, lattice())
+    assert "rounded" in {warning.kind for warning in certify(grid, samples, NOTHING, SETTINGS).warnings}
+    smooth = replace(samples, moved=1.0)
+    assert "rounded" not in {warning.kind for warning in certify(grid, smooth, NOTHING, SETTINGS).warnings}
+
+
 def bounded(grid: st.Grid) -> Boundary:
     """The boundary of a rhombus, with a point every twentieth of a member and a corner at each of its own."""
     (ring,) = grid.boundary_loops
@@ -195,6 +209,16 @@ def test_a_boundary_that_leaves_the_scans_is_a_warning_with_its_places() -> None
         off = float(warning.words.removeprefix("leaves the boundary of the scan by ").split()[0])
         assert warning.kind == "aside" and 0.3 <= off <= 0.4 and not warning.also
         assert np.linalg.norm(np.array(warning.where) - grid.nodes[v]) < 0.5
+
+
+def test_the_ring_of_a_limb_that_a_cap_closes_is_no_boundary_that_a_grid_leaves() -> None:
+    grid = lattice()
+    (outer,) = bounded(grid).loops
+    turn = np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False)
+    ring = np.column_stack([0.4 * np.cos(turn), 0.4 * np.sin(turn), 0.0 * turn])
+    for cut, said in (("close", False), ("open", True), ("", True)):
+        limb = Loop(ring, np.zeros(0, np.int64), external=False, length=2.5, piece=0, cut=cut)
+        assert bool(places_aside(grid, Boundary((outer, limb)), 1.0)) == said
 
 
 def test_a_corner_that_is_cut_off_is_a_warning_with_its_place() -> None:

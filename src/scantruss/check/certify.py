@@ -25,7 +25,7 @@ from .gaps import bridged_gaps
 from .hanging import hanging_nodes
 from .irregular import count_irregular
 from .left_out import closed_holes, first_and_more, parts_left_out
-from .limits import ROUNDED_BY, limits_of, places_to_look_at, widened_limits
+from .limits import NOISES_OFF, ROUNDED_BY, limits_of, places_to_look_at, widened_limits
 from .sheets import cut_apart, faults_on_sheets, nodes_of_samples
 from .unfollowed import unfollowed_parts
 
@@ -96,7 +96,6 @@ class Judged:
         followed = (samples.judged == KEPT) & ~samples.elsewhere
         missed_at = place_of(samples.scan[_missed(found, followed, members)] + samples.origin)
         rough = samples.moved  # then its roughness is the scatter
-        rounded = 0.0 if rough else _rounded(found, followed, members)
         offsets, (gaps, bridged), doubtful, aside, beside, apart = side_by_side(
             lambda: _offsets(grid, samples, length),
             lambda: bridged_gaps(grid, samples, boundary, length),
@@ -105,6 +104,8 @@ class Judged:
             lambda: [] if rough else unfollowed_parts(grid, samples, found, followed, members),
             lambda: cut_apart(grid, samples, found, length),
         )
+        roughness = NOISES_OFF * offsets.get("node_scatter", 0.0) if rough else 0.0
+        rounded = _rounded(found, followed, members, roughness)
         places = places_to_look_at(self.certificate, missed_at, rounded)
         return replace(
             self.certificate,
@@ -256,9 +257,12 @@ def _missed(found: Distances, followed: np.ndarray, members: np.ndarray) -> int:
     return int(np.where(followed & (found.scan <= members), found.scan / members, -1.0).argmax())
 
 
-def _rounded(found: Distances, followed: np.ndarray, members: np.ndarray) -> float:
-    """Return the share of the points that a grid rounds off: of those that it follows (N,) bool, by desired member lengths (N,)."""
-    off = (found.scan > ROUNDED_BY * members) & (found.scan <= COVER_REACH * members)
+def _rounded(found: Distances, followed: np.ndarray, members: np.ndarray, roughness: float) -> float:
+    """Return the share of the points that a grid rounds off: of those that it follows (N,) bool, by desired member lengths (N,).
+
+    roughness : distance from the grid up to which points are scatter about the mean surface [scan unit]
+    """
+    off = (found.scan > ROUNDED_BY * members + roughness) & (found.scan <= COVER_REACH * members)
     return float((followed & off).mean())
 
 
