@@ -60,6 +60,28 @@ def test_a_slit_that_joins_two_parts_is_listed_and_a_warning_with_its_width_and_
     assert float(warning.words.split(" gap ")[1].split()[0]) == pytest.approx(0.6, abs=0.15)
 
 
+def test_a_hole_a_little_wider_than_the_least_is_one_gap_wherever_it_lies() -> None:
+    for x, y in np.random.default_rng(2).uniform(-1.0, 1.0, (12, 2)):
+        listed, warnings = gaps_at(sheet(13, 8, 0.04, keep=lambda a, b, x=x, y=y: np.hypot(a - x, b - y) > 0.3))
+        (gap,) = listed
+        assert not warnings
+        assert np.hypot(known(gap.where)[0] - x, known(gap.where)[1] - y) < 0.1
+        assert 0.45 < known(gap.size) < 0.65
+
+
+def test_holes_under_triangles_with_a_common_node_are_as_many_gaps() -> None:
+    holes = np.array([[-0.5, 0.3], [0.5, 0.3], [0.0, -0.6]])
+    listed, _ = gaps_at(
+        sheet(
+            13,
+            8,
+            0.04,
+            keep=lambda a, b: (np.hypot(a[..., None] - holes[:, 0], b[..., None] - holes[:, 1]) > 0.3).all(-1),
+        )
+    )
+    assert len(listed) == 3
+
+
 def test_a_hole_inside_is_listed_without_a_warning_and_a_narrow_one_is_nothing() -> None:
     listed, warnings = gaps_at(sheet(13, 8, 0.08, keep=lambda x, y: np.hypot(x - 0.4, y) > 0.4))
     assert [gap.kind for gap in listed] == ["gap"] and not warnings
