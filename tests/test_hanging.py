@@ -35,6 +35,19 @@ def test_a_node_on_a_pole_under_the_roof_is_a_fault_with_its_place() -> None:
         certified(hanging, samples, NOTHING, SETTINGS)
 
 
+def test_a_node_at_the_foot_of_a_column_is_a_fault_though_points_are_near_its_members() -> None:
+    turn, height = np.random.default_rng(3).uniform([[0.0], [-1.0]], [[2.0 * np.pi], [0.0]], (2, 300))
+    column = np.column_stack([0.1 * np.cos(turn), 0.1 * np.sin(turn), height])
+    samples, grid = scanned(np.concatenate([sheet(13, 8, 0.06), column]), lattice())
+    down = int(np.linalg.norm(grid.nodes + grid.origin, axis=1).argmin())
+    nodes = grid.nodes.copy()
+    nodes[down, 2] -= 0.8
+    faults = certify(grid.replace(nodes=nodes), samples, NOTHING, SETTINGS).faults
+    (fault,) = (fault for fault in faults if fault.kind == "hanging")
+    assert known(fault.where) == pytest.approx((0.0, 0.0, -0.8), abs=1e-9)
+    assert not any(fault.kind == "hanging" for fault in certify(grid, samples, NOTHING, SETTINGS).faults)
+
+
 def test_a_pyramid_that_was_measured_is_none() -> None:
     """Its members are as steep, but points lie along them."""
     grid = lattice()
