@@ -68,12 +68,12 @@ def bridged_gaps(
     usual = np.median([_level(places[at], normals[owner[at]], away[at], ordered).min(initial=away[at]) for at in some])
     least = np.maximum(least, UNEVEN * usual)
     covering = np.unique(owner[away > (least - NEAR_MIDDLE * members)[owner]])
-    more, theirs = _more_places(grid, covering)
-    from_more = _nearest(more, points, boxes, samples.spacing)
-    order = np.lexsort((-from_more, theirs))
+    extra, theirs = _more_places(grid, covering)
+    from_extra = _nearest(extra, points, boxes, samples.spacing)
+    order = np.lexsort((-from_extra, theirs))
     best = order[np.unique(theirs[order], return_index=True)[1]]
-    places, owner = np.concatenate([places, more[best]]), np.concatenate([owner, theirs[best]])
-    away = np.concatenate([away, from_more[best]])
+    places, owner = np.concatenate([places, extra[best]]), np.concatenate([owner, theirs[best]])
+    away = np.concatenate([away, from_extra[best]])
     points, least = ordered, least[owner]
     far = np.flatnonzero(away > least)
     far = far[np.argsort(-away[far], kind="stable")[:GAPS_LOOKED_AT]]
