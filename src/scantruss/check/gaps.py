@@ -24,9 +24,8 @@ PLACES = np.array([[2, 2, 2], [4, 1, 1], [1, 4, 1], [1, 1, 4]]) / 6.0
 #: places a ninth of a member apart all over a triangle that may cover a gap: one of them is near the middle of that
 MORE_PLACES = np.array([[a, b, 9 - a - b] for a in range(10) for b in range(10 - a)]) / 9.0
 OFF_BOUNDARY = 1.0 / 6.0  # how far such places are from the boundary of the grid [heights of the triangle]
-NEAR_MIDDLE = (
-    0.1  # distance of one of the first places from the middle of a gap that makes its triangle one [member lengths]
-)
+# distance of one of the first places from the middle of a gap that makes its triangle one that may cover it [member lengths]
+NEAR_MIDDLE = 0.1
 HALF_WIDTH = 0.2  # least distance from the nearest point at which a place lies in a gap [member lengths]
 UNEVEN = 4.0  # ... and in usual distances: at random points none is farther, between lines of a scanner half as far
 SOME_PLACES = 50  # places from which the usual distance is taken

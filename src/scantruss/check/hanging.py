@@ -31,7 +31,7 @@ FEWEST_MEMBERS = (
 # a spike is a node off an even sheet, as where a grid runs down a column or up a chimney: its members leave the sheet together
 LITTLE_EMPTY, SPACINGS_LITTLE_EMPTY = 0.1, 5.0  # as HALF_EMPTY and SPACINGS_EMPTY for the members of a spike
 EVEN = 0.8  # cosine of the angle between a spike and the normal of the sheet at the other end of its member
-OFF_SHEET, EVEN_FLAT = 0.3, 0.9  # as STEEP and EVEN of a spike that is poor: on a bent sheet one excludes the other
+LESS_STEEP, EVEN_FLAT = 0.3, 0.9  # as STEEP and EVEN of a spike that is poor: on a bent sheet one excludes the other
 
 
 def hanging_nodes(grid: Grid, samples: SurfaceSamples, found: Distances, length: float) -> list[Fault]:
@@ -51,7 +51,7 @@ def nodes_off_sheets(grid: Grid, samples: SurfaceSamples, length: float) -> list
     """Return a warning where nodes stand off an even sheet but not so far that they hang, with their places; parameters as there."""
     desired = np.full(len(grid.nodes), length) if grid.desired is None else grid.desired
     hanging = _spikes(grid, samples, desired, STEEP, EVEN)
-    nodes = np.setdiff1d(_spikes(grid, samples, desired, OFF_SHEET, EVEN_FLAT), hanging)
+    nodes = np.setdiff1d(_spikes(grid, samples, desired, LESS_STEEP, EVEN_FLAT), hanging)
     return _fault("off sheet", "has a node on points that stand off the sheet around it", grid, nodes)
 
 
