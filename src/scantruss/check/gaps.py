@@ -30,6 +30,9 @@ HALF_WIDTH = 0.2  # least distance from the nearest point at which a place lies 
 UNEVEN = 4.0  # ... and in usual distances: at random points none is farther, between lines of a scanner half as far
 SOME_PLACES = 50  # places from which the usual distance is taken
 POINTS_AROUND = 45  # points up to twice that distance from which on an empty place is no accident, as exp(-n/3) tells
+POINTS_AROUND_MIDDLE = (
+    60  # ... where the emptiest of many places is chosen, which is farther from points than one at random
+)
 ACROSS = np.stack(np.meshgrid(*[np.linspace(-0.6, 0.6, 7)] * 2), axis=-1).reshape(
     -1, 2
 )  # places around another [reach]
@@ -71,12 +74,13 @@ def bridged_gaps(
     from_extra = _nearest(extra, points, boxes, samples.spacing)
     order = np.lexsort((-from_extra, theirs))
     best = order[np.unique(theirs[order], return_index=True)[1]]
+    needed = np.repeat([POINTS_AROUND, POINTS_AROUND_MIDDLE], [len(places), len(best)])
     places, owner = np.concatenate([places, extra[best]]), np.concatenate([owner, theirs[best]])
     away = np.concatenate([away, from_extra[best]])
     points, least = ordered, least[owner]
     far = np.flatnonzero(away > least)
     far = far[np.argsort(-away[far], kind="stable")[:GAPS_LOOKED_AT]]
-    half = np.array([empty_disc(places[at], normals[owner[at]], away[at], points) for at in far])
+    half = np.array([empty_disc(places[at], normals[owner[at]], away[at], points, needed[at]) for at in far])
     far, half = far[half > least[far]], half[half > least[far]]
     if not len(far):
         return [], []
@@ -143,14 +147,16 @@ def _emptiest(middle: np.ndarray, normal: np.ndarray, reach: float, points: np.n
     return places[int(np.argmax(away))]
 
 
-def empty_disc(place: np.ndarray, normal: np.ndarray, away: float, points: np.ndarray) -> float:
+def empty_disc(
+    place: np.ndarray, normal: np.ndarray, away: float, points: np.ndarray, least: int = POINTS_AROUND
+) -> float:
     """Return the radius of the disc around a place (3,) that is free of points, 0 where that may be an accident.
 
-    away : distance of the nearest point; points : (N, 3) by ascending x.
+    away : distance of the nearest point; points : (N, 3) by ascending x; least : points around it from which on it is no accident.
     """
     level = _level(place, normal, away, points)
     radius = float(level.min(initial=away))
-    return radius if (level <= 2.0 * radius).sum() >= POINTS_AROUND else 0.0
+    return radius if (level <= 2.0 * radius).sum() >= least else 0.0
 
 
 def _level(place: np.ndarray, normal: np.ndarray, away: float, points: np.ndarray) -> np.ndarray:
