@@ -128,6 +128,7 @@ def refused(capsys: pytest.CaptureFixture[str], *words: Any, status: int = 2) ->
         ),
         ("grid scan.xyz a.obj --length 4 --boundary no.csv", "cannot read boundaries no.csv"),
         ("grid scan.xyz a.obj --lenght 4", "unknown option --lenght (did you mean --length?)"),
+        ("grid scan.xyz a.obj --scale 2", "unknown option --scale;"),
         ("grid scan.xyz a.obj --length 4 --merge-angle wide", "--merge-angle: needs a number"),
         ("grid scan.xyz a.obj --length 4 --smooth-passes 1.5", "--smooth-passes: needs a whole number"),
         ("grid scan.xyz a.obj --length 4 --fixed 1,2", "--fixed: needs three numbers X,Y,Z, got '1,2'"),

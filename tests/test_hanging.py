@@ -10,6 +10,7 @@ from typed import known
 
 import scantruss as st
 from scantruss.check.certify import certified, certify
+from scantruss.check.hanging import nodes_off_sheets
 from scantruss.errors import CertificateError
 
 SETTINGS = st.Settings(length=1.0, ridge_angle=0.0)
@@ -33,6 +34,39 @@ def test_a_node_on_a_pole_under_the_roof_is_a_fault_with_its_place() -> None:
     assert known(fault.where) == pytest.approx((0.0, 0.0, -0.8), abs=1e-9)
     with pytest.raises(CertificateError, match=r"hangs on points off the surface.*--crop or --piece"):
         certified(hanging, samples, NOTHING, SETTINGS)
+
+
+def test_a_node_at_the_foot_of_a_column_is_a_fault_though_points_are_near_its_members() -> None:
+    turn, height = np.random.default_rng(3).uniform([[0.0], [-1.0]], [[2.0 * np.pi], [0.0]], (2, 300))
+    column = np.column_stack([0.1 * np.cos(turn), 0.1 * np.sin(turn), height])
+    samples, grid = scanned(np.concatenate([sheet(13, 8, 0.06), column]), lattice())
+    down = int(np.linalg.norm(grid.nodes + grid.origin, axis=1).argmin())
+    nodes = grid.nodes.copy()
+    nodes[down, 2] -= 0.8
+    faults = certify(grid.replace(nodes=nodes), samples, NOTHING, SETTINGS).faults
+    (fault,) = (fault for fault in faults if fault.kind == "hanging")
+    assert known(fault.where) == pytest.approx((0.0, 0.0, -0.8), abs=1e-9)
+    assert not any(fault.kind == "hanging" for fault in certify(grid, samples, NOTHING, SETTINGS).faults)
+
+
+def test_a_node_some_way_down_a_column_is_a_warning_but_none_on_a_bent_sheet() -> None:
+    turn, height = np.random.default_rng(3).uniform([[0.0], [-1.0]], [[2.0 * np.pi], [0.0]], (2, 300))
+    column = np.column_stack([0.1 * np.cos(turn), 0.1 * np.sin(turn), height])
+    samples, grid = scanned(np.concatenate([ROOF, column]), lattice())
+    down = int(np.linalg.norm(grid.nodes + grid.origin, axis=1).argmin())
+    nodes = grid.nodes.copy()
+    nodes[down, 2] -= 0.4
+    found = certify(grid.replace(nodes=nodes), samples, NOTHING, SETTINGS)
+    assert not any(fault.kind == "hanging" for fault in found.faults)
+    (warning,) = (warning for warning in found.warnings if warning.kind == "off sheet")
+    assert known(warning.where) == pytest.approx((0.0, 0.0, -0.4), abs=1e-9)
+    assert not nodes_off_sheets(grid, samples, 1.0)
+    for radius in (0.7, 1.0, 1.5, 2.5):  # spheres bent ever less, and the tip of each
+        at, points = lattice().nodes, ROOF.copy()
+        for places in (at, points):
+            places[:, 2] = np.sqrt(np.maximum(radius**2 - (places[:, :2] ** 2).sum(axis=1), 0.0))
+        ball, bent = scanned(points, lattice().replace(nodes=at))
+        assert not nodes_off_sheets(bent, ball, 1.0)
 
 
 def test_a_pyramid_that_was_measured_is_none() -> None:

@@ -9,6 +9,7 @@ import pytest
 from marks import compiled_only
 from small_clouds import ball, sheet, tire
 from steps import boundary_of, steps_of
+from threadpoolctl import threadpool_limits
 from typed import known
 
 import scantruss as st
@@ -130,6 +131,16 @@ def test_a_thin_plate_passes_through_its_places_and_keeps_what_is_straight() -> 
     assert thin_plate(flat, np.column_stack([np.ones(30), flat]) @ straight, wanted, 0.1) == pytest.approx(
         np.column_stack([np.ones(50), wanted]) @ straight
     )
+
+
+def test_a_filled_hole_is_the_same_to_the_byte_with_any_number_of_threads() -> None:
+    rng = np.random.default_rng(8)
+    flat, values, wanted = rng.uniform(-1, 1, (700, 2)), rng.normal(size=(700, 3)), rng.uniform(-1, 1, (900, 2))
+    found = []
+    for threads in (1, 2):
+        with threadpool_limits(threads, user_api="blas"):
+            found.append(thin_plate(flat, values, wanted, 1e-3).tobytes())
+    assert found[0] == found[1]
 
 
 def test_a_lattice_fills_a_polygon_and_keeps_off_its_rim() -> None:

@@ -60,6 +60,29 @@ def test_a_slit_that_joins_two_parts_is_listed_and_a_warning_with_its_width_and_
     assert float(warning.words.split(" gap ")[1].split()[0]) == pytest.approx(0.6, abs=0.15)
 
 
+def test_a_hole_a_little_wider_than_the_least_is_one_gap_wherever_it_lies() -> None:
+    points = sheet(13, 8, 0.04)
+    for x, y in np.random.default_rng(2).uniform(-1.0, 1.0, (12, 2)):
+        listed, warnings = gaps_at(points[np.hypot(points[:, 0] - x, points[:, 1] - y) > 0.3])
+        (gap,) = listed
+        assert not warnings
+        assert np.hypot(known(gap.where)[0] - x, known(gap.where)[1] - y) < 0.1
+        assert 0.45 < known(gap.size) < 0.7
+
+
+def test_holes_under_triangles_with_a_common_node_are_as_many_gaps() -> None:
+    holes = np.array([[-0.5, 0.3], [0.5, 0.3], [0.0, -0.6]])
+    listed, _ = gaps_at(
+        sheet(
+            13,
+            8,
+            0.04,
+            keep=lambda a, b: (np.hypot(a[..., None] - holes[:, 0], b[..., None] - holes[:, 1]) > 0.3).all(-1),
+        )
+    )
+    assert len(listed) == 3
+
+
 def test_a_hole_inside_is_listed_without_a_warning_and_a_narrow_one_is_nothing() -> None:
     listed, warnings = gaps_at(sheet(13, 8, 0.08, keep=lambda x, y: np.hypot(x - 0.4, y) > 0.4))
     assert [gap.kind for gap in listed] == ["gap"] and not warnings
@@ -168,6 +191,20 @@ def test_what_is_rounded_off_by_a_quarter_of_a_member_is_a_warning() -> None:
     assert "rounded" not in {warning.kind for warning in certify(grid, samples, NOTHING, SETTINGS).warnings}
 
 
+def test_what_a_grid_of_the_mean_surface_rounds_off_is_said_as_far_as_it_is_no_roughness() -> None:
+    points = sheet(13, 8, 0.08)
+    points[:, 2] += 0.4 * np.exp(-(points[:, 0] ** 2 + points[:, 1] ** 2) / 2.0)
+    samples, grid = scanned(points, lattice())
+    bump = replace(samples, moved=1.0)
+    assert "rounded" in {warning.kind for warning in certify(grid, bump, NOTHING, SETTINGS).warnings}
+    rough = sheet(13, 8, 0.08)
+    rough[:, 2] += np.random.default_rng(4).choice([-0.28, 0.28], len(rough))
+    samples, grid = scanned(rough, lattice())
+    assert "rounded" in {warning.kind for warning in certify(grid, samples, NOTHING, SETTINGS).warnings}
+    smooth = replace(samples, moved=1.0)
+    assert "rounded" not in {warning.kind for warning in certify(grid, smooth, NOTHING, SETTINGS).warnings}
+
+
 def bounded(grid: st.Grid) -> Boundary:
     """The boundary of a rhombus, with a point every twentieth of a member and a corner at each of its own."""
     (ring,) = grid.boundary_loops
@@ -195,6 +232,16 @@ def test_a_boundary_that_leaves_the_scans_is_a_warning_with_its_places() -> None
         off = float(warning.words.removeprefix("leaves the boundary of the scan by ").split()[0])
         assert warning.kind == "aside" and 0.3 <= off <= 0.4 and not warning.also
         assert np.linalg.norm(np.array(warning.where) - grid.nodes[v]) < 0.5
+
+
+def test_the_ring_of_a_limb_that_a_cap_closes_is_no_boundary_that_a_grid_leaves() -> None:
+    grid = lattice()
+    (outer,) = bounded(grid).loops
+    turn = np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False)
+    ring = np.column_stack([0.4 * np.cos(turn), 0.4 * np.sin(turn), 0.0 * turn])
+    for cut, said in (("close", False), ("open", True), ("", True)):
+        limb = Loop(ring, np.zeros(0, np.int64), external=False, length=2.5, piece=0, cut=cut)
+        assert bool(places_aside(grid, Boundary((outer, limb)), 1.0)) == said
 
 
 def test_a_corner_that_is_cut_off_is_a_warning_with_its_place() -> None:

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..kernels.mesh.point_location import nearest_sample
 from ..kernels.surface.local_surface import PATCH_COLUMNS, Surface, fit_patch, onto_patch, patch_normal, walk
+from ..runtime.blas import one_blas_thread
 from ..surface.samples import SurfaceSamples
 
 FILLING_SPACING = 0.1  # distance between the points generated over a hole [member lengths]
@@ -136,11 +137,12 @@ def _thin_plate(flat: np.ndarray, values: np.ndarray, wanted: np.ndarray, smooth
     matrix[:count, :count] = _bending(at, at) + smoothing / size**2 * np.eye(count)
     matrix[:count, count:] = np.column_stack([np.ones(count), at])
     matrix[count:, :count] = matrix[:count, count:].T
-    weights = np.linalg.solve(matrix, np.concatenate([values, np.zeros((3, 3))]))
-    parts = [
-        _bending(part, at) @ weights[:count] + np.column_stack([np.ones(len(part)), part]) @ weights[count:]
-        for part in np.array_split(to, 1 + len(to) * count // 1_000_000)
-    ]
+    with one_blas_thread():  # the last bits of sums depend on how many there are
+        weights = np.linalg.solve(matrix, np.concatenate([values, np.zeros((3, 3))]))
+        parts = [
+            _bending(part, at) @ weights[:count] + np.column_stack([np.ones(len(part)), part]) @ weights[count:]
+            for part in np.array_split(to, 1 + len(to) * count // 1_000_000)
+        ]
     return np.concatenate(parts)
 
 

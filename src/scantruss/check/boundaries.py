@@ -32,10 +32,11 @@ def places_aside(grid: Grid, boundary: Boundary, length: float) -> list[Fault]:
     grid : Grid
         Of the same origin as the scan.
     boundary : Boundary
-        Loops of the scan that the grid keeps.
+        Loops of the scan; those of limbs that are closed by caps are no boundary of the grid.
     length : float
         Desired member length where the grid has none of its own [scan unit].
     """
+    boundary = replace(boundary, loops=tuple(loop for loop in boundary.loops if loop.cut != "close"))
     loops, chains = boundary.loops, grid.boundary_loops
     if not loops or not chains:
         return []

@@ -22,10 +22,10 @@ from .distances import Distances, measure_distances, offsets_from_points
 from .doubtful import doubtful_places
 from .folds import fold_angles
 from .gaps import bridged_gaps
-from .hanging import hanging_nodes
+from .hanging import hanging_nodes, nodes_off_sheets
 from .irregular import count_irregular
 from .left_out import closed_holes, first_and_more, parts_left_out
-from .limits import ROUNDED_BY, limits_of, places_to_look_at, widened_limits
+from .limits import NOISES_OFF, ROUNDED_BY, limits_of, places_to_look_at, widened_limits
 from .sheets import cut_apart, faults_on_sheets, nodes_of_samples
 from .unfollowed import unfollowed_parts
 
@@ -96,20 +96,22 @@ class Judged:
         followed = (samples.judged == KEPT) & ~samples.elsewhere
         missed_at = place_of(samples.scan[_missed(found, followed, members)] + samples.origin)
         rough = samples.moved  # then its roughness is the scatter
-        rounded = 0.0 if rough else _rounded(found, followed, members)
-        offsets, (gaps, bridged), doubtful, aside, beside, apart = side_by_side(
+        offsets, (gaps, bridged), doubtful, aside, beside, apart, off_sheets = side_by_side(
             lambda: _offsets(grid, samples, length),
             lambda: bridged_gaps(grid, samples, boundary, length),
             lambda: [] if settings.boundary else doubtful_places(grid, samples, length),
             lambda: places_aside(grid, boundary, length),
             lambda: [] if rough else unfollowed_parts(grid, samples, found, followed, members),
             lambda: cut_apart(grid, samples, found, length),
+            lambda: nodes_off_sheets(grid, samples, length),
         )
+        roughness = NOISES_OFF * offsets.get("node_scatter", 0.0) if rough else 0.0
+        rounded = _rounded(found, followed, members, roughness)
         places = places_to_look_at(self.certificate, missed_at, rounded)
         return replace(
             self.certificate,
             left_out=(*self.certificate.left_out, *closed_holes(samples, boundary), *first_and_more(gaps)),
-            warnings=(*self.certificate.warnings, *apart, *bridged, *doubtful, *aside, *beside, *places),
+            warnings=(*self.certificate.warnings, *apart, *off_sheets, *bridged, *doubtful, *aside, *beside, *places),
             **offsets,
         )
 
@@ -256,9 +258,12 @@ def _missed(found: Distances, followed: np.ndarray, members: np.ndarray) -> int:
     return int(np.where(followed & (found.scan <= members), found.scan / members, -1.0).argmax())
 
 
-def _rounded(found: Distances, followed: np.ndarray, members: np.ndarray) -> float:
-    """Return the share of the points that a grid rounds off: of those that it follows (N,) bool, by desired member lengths (N,)."""
-    off = (found.scan > ROUNDED_BY * members) & (found.scan <= COVER_REACH * members)
+def _rounded(found: Distances, followed: np.ndarray, members: np.ndarray, roughness: float) -> float:
+    """Return the share of the points that a grid rounds off: of those that it follows (N,) bool, by desired member lengths (N,).
+
+    roughness : distance from the grid up to which points are scatter about the mean surface [scan unit]
+    """
+    off = (found.scan > ROUNDED_BY * members + roughness) & (found.scan <= COVER_REACH * members)
     return float((followed & off).mean())
 
 

@@ -21,10 +21,18 @@ if TYPE_CHECKING:
 #: places in a triangle that are looked at, by its corners; with its corners and the middles of its members none is farther than a sixth
 #: of a member from one of them
 PLACES = np.array([[2, 2, 2], [4, 1, 1], [1, 4, 1], [1, 1, 4]]) / 6.0
+#: places a ninth of a member apart all over a triangle that may cover a gap: one of them is near the middle of that
+MORE_PLACES = np.array([[a, b, 9 - a - b] for a in range(10) for b in range(10 - a)]) / 9.0
+OFF_BOUNDARY = 1.0 / 6.0  # how far such places are from the boundary of the grid [heights of the triangle]
+# distance of one of the first places from the middle of a gap that makes its triangle one that may cover it [member lengths]
+NEAR_MIDDLE = 0.1
 HALF_WIDTH = 0.2  # least distance from the nearest point at which a place lies in a gap [member lengths]
 UNEVEN = 4.0  # ... and in usual distances: at random points none is farther, between lines of a scanner half as far
 SOME_PLACES = 50  # places from which the usual distance is taken
 POINTS_AROUND = 45  # points up to twice that distance from which on an empty place is no accident, as exp(-n/3) tells
+POINTS_AROUND_MIDDLE = (
+    60  # ... where the emptiest of many places is chosen, which is farther from points than one at random
+)
 ACROSS = np.stack(np.meshgrid(*[np.linspace(-0.6, 0.6, 7)] * 2), axis=-1).reshape(
     -1, 2
 )  # places around another [reach]
@@ -51,24 +59,33 @@ def bridged_gaps(
     points = samples.measured_points
     boxes = boxes_of(points, max(POINT_BOX * length, 2.0 * samples.spacing))
     places, owner = _places(grid)
-    away = np.empty(len(places))
-    nearest_distances(places, points, boxes, 2.0 * samples.spacing, away)
+    away = _nearest(places, points, boxes, samples.spacing)
     members = np.full(len(grid.nodes), length) if grid.desired is None else grid.desired
-    least = HALF_WIDTH * members[grid.triangles].mean(axis=1)[owner]
-    if not (away > least).any():
+    members = members[grid.triangles].mean(axis=1)
+    least = HALF_WIDTH * members
+    if not (away > (least - NEAR_MIDDLE * members)[owner]).any():
         return [], []
-    points, normals = by_x(points), _normals(grid)
+    ordered, normals = by_x(points), _normals(grid)
     some = np.arange(0, len(places), len(places) // SOME_PLACES + 1)
-    usual = np.median([_level(places[at], normals[owner[at]], away[at], points).min(initial=away[at]) for at in some])
+    usual = np.median([_level(places[at], normals[owner[at]], away[at], ordered).min(initial=away[at]) for at in some])
     least = np.maximum(least, UNEVEN * usual)
+    covering = np.unique(owner[away > (least - NEAR_MIDDLE * members)[owner]])
+    extra, theirs = _more_places(grid, covering)
+    from_extra = _nearest(extra, points, boxes, samples.spacing)
+    order = np.lexsort((-from_extra, theirs))
+    best = order[np.unique(theirs[order], return_index=True)[1]]
+    needed = np.repeat([POINTS_AROUND, POINTS_AROUND_MIDDLE], [len(places), len(best)])
+    places, owner = np.concatenate([places, extra[best]]), np.concatenate([owner, theirs[best]])
+    away = np.concatenate([away, from_extra[best]])
+    points, least = ordered, least[owner]
     far = np.flatnonzero(away > least)
     far = far[np.argsort(-away[far], kind="stable")[:GAPS_LOOKED_AT]]
-    half = np.array([empty_disc(places[at], normals[owner[at]], away[at], points) for at in far])
+    half = np.array([empty_disc(places[at], normals[owner[at]], away[at], points, needed[at]) for at in far])
     far, half = far[half > least[far]], half[half > least[far]]
     if not len(far):
         return [], []
     triangle = owner[far]
-    group = _groups(grid, triangle)[triangle]
+    group = _groups(grid, triangle, places[far], half)[triangle]
     is_open = _open_triangles(grid, samples.measured_points, boxes, length)
     found: list[tuple[float, LeftOut, bool]] = []
     for each in np.unique(group):
@@ -88,6 +105,13 @@ def bridged_gaps(
         [Fault("gap", words, wide[0][1], tuple(where for _, where in wide[1:PLACES_KEPT] if where))] if wide else []
     )
     return [gap for _, gap, _ in found], warnings
+
+
+def _nearest(places: np.ndarray, points: np.ndarray, boxes: SearchBoxes, spacing: float) -> np.ndarray:
+    """Return the distance of each place (K, 3) from the nearest point (K,); boxes of the points, and their spacing."""
+    away = np.empty(len(places))
+    nearest_distances(places, points, boxes, 2.0 * spacing, away)
+    return away
 
 
 def by_x(points: np.ndarray) -> np.ndarray:
@@ -123,14 +147,16 @@ def _emptiest(middle: np.ndarray, normal: np.ndarray, reach: float, points: np.n
     return places[int(np.argmax(away))]
 
 
-def empty_disc(place: np.ndarray, normal: np.ndarray, away: float, points: np.ndarray) -> float:
+def empty_disc(
+    place: np.ndarray, normal: np.ndarray, away: float, points: np.ndarray, least: int = POINTS_AROUND
+) -> float:
     """Return the radius of the disc around a place (3,) that is free of points, 0 where that may be an accident.
 
-    away : distance of the nearest point; points : (N, 3) by ascending x.
+    away : distance of the nearest point; points : (N, 3) by ascending x; least : points around it from which on it is no accident.
     """
     level = _level(place, normal, away, points)
     radius = float(level.min(initial=away))
-    return radius if (level <= 2.0 * radius).sum() >= POINTS_AROUND else 0.0
+    return radius if (level <= 2.0 * radius).sum() >= least else 0.0
 
 
 def _level(place: np.ndarray, normal: np.ndarray, away: float, points: np.ndarray) -> np.ndarray:
@@ -161,6 +187,20 @@ def _places(grid: Grid) -> tuple[np.ndarray, np.ndarray]:
     return places, np.concatenate([numbers, grid.edge_triangles[inner, 0], of_node[nodes]])
 
 
+def _more_places(grid: Grid, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return places all over some triangles (K,) but not near the boundary of their grid (P, 3), and a triangle of each (P,)."""
+    outer = np.flatnonzero(grid.edge_triangles[:, 1] < 0)
+    triangles, ends = grid.edge_triangles[outer, 0], grid.edges[outer]
+    opposite = np.zeros((len(grid.triangles), 3), np.bool_)  # corners that face a member of the boundary
+    member, corner = np.nonzero((grid.triangles[triangles][:, :, None] != ends[:, None, :]).all(axis=2))
+    opposite[triangles[member], corner] = True
+    at_boundary = np.isin(grid.triangles[chosen], ends)
+    near = (opposite[chosen][:, None] & (MORE_PLACES < OFF_BOUNDARY - 1e-9)).any(axis=2)
+    near |= (at_boundary[:, None] & (MORE_PLACES > 1.0 - OFF_BOUNDARY + 1e-9)).any(axis=2)
+    places = np.einsum("pc,tcx->tpx", MORE_PLACES, grid.nodes[grid.triangles[chosen]])[~near]
+    return places, chosen[np.nonzero(~near)[0]]
+
+
 def _open_triangles(grid: Grid, points: np.ndarray, boxes: SearchBoxes, length: float) -> np.ndarray:
     """Return which triangles (T,) bool have a node where the boundary of the grid leaves the scan."""
     members = grid.edges[grid.edge_triangles[:, 1] < 0]
@@ -171,11 +211,15 @@ def _open_triangles(grid: Grid, points: np.ndarray, boxes: SearchBoxes, length: 
     return np.asarray(np.isin(grid.triangles, ends[away > OPEN * length]).any(axis=1))
 
 
-def _groups(grid: Grid, chosen: np.ndarray) -> np.ndarray:
-    """Return a number (T,) for each triangle: the same for those of some (K,) that have a node in common."""
-    a, b, c = grid.triangles[np.unique(chosen)].T
-    label = component_labels(len(grid.nodes), np.concatenate([a, b]), np.concatenate([b, c]))
-    return label[grid.triangles[:, 0]]
+def _groups(grid: Grid, chosen: np.ndarray, middles: np.ndarray, radii: np.ndarray) -> np.ndarray:
+    """Return a number (T,) for each triangle: the same for those of some (K,) that have a member in common or whose discs overlap."""
+    one, other = grid.edge_triangles[np.isin(grid.edge_triangles, chosen).all(axis=1)].T
+    apart = np.linalg.norm(middles[:, None] - middles, axis=2)
+    these, those = np.nonzero(apart < radii[:, None] + radii)
+    label: np.ndarray = component_labels(
+        len(grid.triangles), np.concatenate([one, chosen[these]]), np.concatenate([other, chosen[those]])
+    )
+    return label
 
 
 def _is_known(place: np.ndarray, samples: SurfaceSamples, boundary: Boundary) -> bool:

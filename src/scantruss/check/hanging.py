@@ -1,4 +1,4 @@
-"""Nodes that hang on points off the surface, as on a scaffold under a roof: most of their members cross empty space to get there."""
+"""Nodes that hang on points off the surface, as on a scaffold or a column under a roof: their members cross empty space to get there."""
 
 from __future__ import annotations
 
@@ -28,6 +28,10 @@ STEEP = 0.6  # sine of the angle between a member and the surface above which it
 FEWEST_MEMBERS = (
     3  # such members at a node, and half of all, from which on it hangs: at a cliff or a horn there are fewer
 )
+# a spike is a node off an even sheet, as where a grid runs down a column or up a chimney: its members leave the sheet together
+LITTLE_EMPTY, SPACINGS_LITTLE_EMPTY = 0.1, 5.0  # as HALF_EMPTY and SPACINGS_EMPTY for the members of a spike
+EVEN = 0.8  # cosine of the angle between a spike and the normal of the sheet at the other end of its member
+LESS_STEEP, EVEN_FLAT = 0.3, 0.9  # as STEEP and EVEN of a spike that is poor: on a bent sheet one excludes the other
 
 
 def hanging_nodes(grid: Grid, samples: SurfaceSamples, found: Distances, length: float) -> list[Fault]:
@@ -39,6 +43,29 @@ def hanging_nodes(grid: Grid, samples: SurfaceSamples, found: Distances, length:
     length : desired member length where the grid has none of its own [scan unit]
     """
     desired = np.full(len(grid.nodes), length) if grid.desired is None else grid.desired
+    nodes = np.union1d(_far_off(grid, samples, found, desired), _spikes(grid, samples, desired, STEEP, EVEN))
+    return _fault("hanging", "hangs on points off the surface, across empty space", grid, nodes)
+
+
+def nodes_off_sheets(grid: Grid, samples: SurfaceSamples, length: float) -> list[Fault]:
+    """Return a warning where nodes stand off an even sheet but not so far that they hang, with their places; parameters as there."""
+    desired = np.full(len(grid.nodes), length) if grid.desired is None else grid.desired
+    hanging = _spikes(grid, samples, desired, STEEP, EVEN)
+    nodes = np.setdiff1d(_spikes(grid, samples, desired, LESS_STEEP, EVEN_FLAT), hanging)
+    return _fault("off sheet", "has a node on points that stand off the sheet around it", grid, nodes)
+
+
+def _fault(kind: str, words: str, grid: Grid, nodes: np.ndarray) -> list[Fault]:
+    """Return what is wrong with some nodes (K,), with their places; nothing where there is none."""
+    if not len(nodes):
+        return []
+    where, *others = (place_of(grid.nodes[node] + grid.origin) for node in nodes[:PLACES_KEPT])
+    more = f" ({len(nodes)} such places)" if len(nodes) > 1 else ""
+    return [Fault(kind, words + more, where, tuple(others))]
+
+
+def _far_off(grid: Grid, samples: SurfaceSamples, found: Distances, desired: np.ndarray) -> np.ndarray:
+    """Return the nodes (K,) most of whose members cross space that is empty and leave the surface steeply."""
     members, uses = desired[grid.edges].mean(axis=1), np.bincount(grid.edges.ravel(), minlength=len(grid.nodes))
     least = np.maximum(HALF_EMPTY * members, SPACINGS_EMPTY * samples.spacing)
     away = np.where(np.isfinite(found.triangles), found.triangles, 0.0)[grid.edge_triangles]
@@ -46,18 +73,13 @@ def hanging_nodes(grid: Grid, samples: SurfaceSamples, found: Distances, length:
     doubted &= _hangs(grid, doubted, uses)[grid.edges].any(axis=1)
     which = np.flatnonzero(doubted)
     if not len(which):
-        return []
-    middles, distance = np.ascontiguousarray(grid.nodes[grid.edges[which]].mean(axis=1)), np.empty(len(which))
-    points = samples.measured_points
-    nearest_distances(
-        middles, points, boxes_of(points, max(POINT_BOX * length, 2.0 * samples.spacing)), length, distance
-    )
-    doubted[which[distance <= least[which]]] = False
+        return which
+    doubted[which[_middles_away(grid, samples, which, desired) <= least[which]]] = False
     hanging = _hangs(grid, doubted, uses)
     which = np.flatnonzero(doubted & hanging[grid.edges].any(axis=1))
     if not len(which):
-        return []
-    points = by_x(points)
+        return which
+    points = by_x(samples.measured_points)
     normals = {
         node: _normal(grid.nodes[node], AROUND_END * desired[node], points) for node in set(grid.edges[which].flat)
     }
@@ -65,12 +87,45 @@ def hanging_nodes(grid: Grid, samples: SurfaceSamples, found: Distances, length:
         one, other = grid.edges[member]
         way = (grid.nodes[other] - grid.nodes[one]) / np.linalg.norm(grid.nodes[other] - grid.nodes[one])
         doubted[member] = max(abs(normals[one] @ way), abs(normals[other] @ way)) > STEEP
-    nodes = np.flatnonzero(_hangs(grid, doubted, uses))
-    if not len(nodes):
-        return []
-    where, *others = (place_of(grid.nodes[node] + grid.origin) for node in nodes[:PLACES_KEPT])
-    more = f" ({len(nodes)} such places)" if len(nodes) > 1 else ""
-    return [Fault("hanging", f"hangs on points off the surface, across empty space{more}", where, tuple(others))]
+    return np.flatnonzero(_hangs(grid, doubted, uses))
+
+
+def _spikes(grid: Grid, samples: SurfaceSamples, desired: np.ndarray, steep: float, even: float) -> np.ndarray:
+    """Return the nodes (K,) that lie off an even sheet, from which most of their members leave for them, beside points.
+
+    steep : sine of the angle between such a member and the sheet, least
+    even : cosine of the angle between the spike and the normals of the sheet, least
+    """
+    ends = np.concatenate([grid.edges, grid.edges[:, ::-1]])
+    ways = grid.nodes[ends[:, 1]] - grid.nodes[ends[:, 0]]
+    ways /= np.maximum(np.linalg.norm(ways, axis=1), 1e-300)[:, None]
+    uses = np.maximum(np.bincount(ends[:, 0], minlength=len(grid.nodes)), 1)
+    axes = np.stack([np.bincount(ends[:, 0], ways[:, k], len(grid.nodes)) for k in range(3)], axis=1) / uses[:, None]
+    sharp = np.linalg.norm(axes, axis=1)
+    pointed = sharp > steep
+    pointed[grid.edges[grid.edge_triangles[:, 1] < 0]] = False
+    which = np.flatnonzero(pointed[ends[:, 0]])
+    if not len(which):
+        return which
+    away = _middles_away(grid, samples, which % len(grid.edges), desired)
+    node, foot = ends[which].T
+    empty = away > np.maximum(LITTLE_EMPTY * desired[node], SPACINGS_LITTLE_EMPTY * samples.spacing)
+    which, node, foot = which[empty], node[empty], foot[empty]
+    points = by_x(samples.measured_points)
+    found, of = np.unique(foot, return_inverse=True)
+    normals = np.array([_normal(grid.nodes[k], AROUND_END * desired[k], points) for k in found]).reshape(-1, 3)[of]
+    leaves = abs((normals * ways[which]).sum(axis=1)) > steep
+    leaves &= abs((normals * axes[node]).sum(axis=1)) > even * sharp[node]
+    count = np.bincount(node[leaves], minlength=len(grid.nodes))
+    return np.flatnonzero((count >= FEWEST_MEMBERS) & (2 * count >= uses))
+
+
+def _middles_away(grid: Grid, samples: SurfaceSamples, which: np.ndarray, desired: np.ndarray) -> np.ndarray:
+    """Return the distance of the middle of each of some members (K,) from the nearest point (K,)."""
+    points, length = samples.measured_points, float(desired.mean())
+    middles, away = np.ascontiguousarray(grid.nodes[grid.edges[which]].mean(axis=1)), np.empty(len(which))
+    nearest_distances(middles, points, boxes_of(points, max(POINT_BOX * length, 2.0 * samples.spacing)), length, away)
+    return away
 
 
 def _hangs(grid: Grid, chosen: np.ndarray, uses: np.ndarray) -> np.ndarray:

@@ -28,8 +28,8 @@ WARN_OFFSET = 0.05  # distance of a node from the scan, beyond its noise, from w
 NOISES_OFF = 3.0  # rms distances of points from their plane that are noise
 PLACES_KEPT = 30  # places of a fault that are kept, the worst first
 ROUNDED_BY = 0.25  # distance from the grid above which a point is rounded off [member lengths]
-WARN_ROUNDED = 0.03  # share of the points that a grid may round off without a word
-WARN_LEFT_OUT = 0.01  # share of the points that a grid may miss, and ScanTruss may leave out by itself, without a word
+# share of the points that a grid may miss or round off, and ScanTruss may leave out by itself, without a word
+WARN_LEFT_OUT = 0.01
 
 
 @dataclass(frozen=True)
@@ -130,7 +130,7 @@ def places_to_look_at(found: Certificate, missed_at: Place, rounded: float = 0.0
     if found.missing > WARN_LEFT_OUT:
         words = f"misses {found.missing:.1%} of the points by more than half a member"
         warnings.append(Fault("missed", words, missed_at))
-    if rounded > WARN_ROUNDED:
+    if rounded > WARN_LEFT_OUT:
         words = (
             f"rounds off {rounded:.0%} of the points by more than a quarter of a member; shorter members follow them"
         )

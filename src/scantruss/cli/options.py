@@ -62,8 +62,10 @@ class Parser(argparse.ArgumentParser):
 
         word = word.partition("=")[0]
         begin = sorted((name for name in self._option_string_actions if name.startswith(word)), key=len)
-        near = begin[:1] if len(word) > 2 and begin else get_close_matches(word, self._option_string_actions, 1, 0.7)
-        return f" (did you mean {near[0]}?)" if near else ""
+        known = {name.lstrip("-"): name for name in self._option_string_actions}  # dashes make all names alike
+        close = get_close_matches(word.lstrip("-"), known, 1, 0.7)
+        near = begin[0] if len(word) > 2 and begin else known[close[0]] if close else ""
+        return f" (did you mean {near}?)" if near else ""
 
 
 def add_force(parser: argparse.ArgumentParser) -> None:

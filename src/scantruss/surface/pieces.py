@@ -44,7 +44,11 @@ def chosen_pieces(large: tuple[int, ...], wanted: str, floor: int | None) -> tup
         return tuple(number for number in large if number != floor)
     numbers = [1] if wanted == "largest" else [int(word) for word in wanted.split(",")]
     if max(numbers) > len(large):
-        raise InputError(f"piece {max(numbers)} is asked for, but the scan has {len(large)} that can carry a grid")
+        choice = "1" if len(large) == 1 else f"a number up to {len(large)}"
+        raise InputError(
+            f"piece {max(numbers)} is asked for, but the scan has {len(large)} that can carry a grid;"
+            f" choose {choice}, largest or all, or --no-keep-rods to part pieces that poles or cables join"
+        )
     return tuple(large[number - 1] for number in sorted(set(numbers)))
 
 
