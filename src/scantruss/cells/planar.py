@@ -173,7 +173,7 @@ def _lengths_kept(nodes: np.ndarray, ends: np.ndarray, lengths: np.ndarray) -> t
     """Return what keeps the members as long as they were [their lengths]."""
     way = nodes[ends[:, 1]] - nodes[ends[:, 0]]
     size = np.linalg.norm(way, axis=1)
-    way /= (size * lengths)[:, None]
+    way /= np.maximum(size * lengths, 1e-300)[:, None]
     return _rows(ends, np.stack([-way, way], axis=1), len(nodes)), (lengths - size) / lengths
 
 
