@@ -140,12 +140,14 @@ def find_half_turn(points: np.ndarray, rotation: Rotation, tolerance: float) -> 
 def check_half_turn(points: np.ndarray, rotation: Rotation, row: Sequence[float], tolerance: float) -> Rotation:
     """Return the half turn that the user gives beside a rotation, if the scan has it; see `find_half_turn`."""
     given = Rotation.of_row(row)
+    refusal = "the axis of the half turn must meet that of the rotation squarely"
+    if abs(float(np.dot(given.axis, rotation.axis))) > SQUARE:
+        raise InputError(refusal)
     exact = _squared(rotation, given)
     off = np.abs(np.subtract((*exact.point, *exact.axis), (*given.point, *given.axis)))
     exact = given if off.max() < EXACT * (1.0 + np.abs(given.point).max()) else exact
-    moved = np.linalg.norm(np.cross(np.subtract(exact.point, given.point), given.axis))
-    if abs(float(np.dot(given.axis, rotation.axis))) > SQUARE or moved > tolerance:
-        raise InputError("the axis of the half turn must meet that of the rotation squarely")
+    if np.linalg.norm(np.cross(np.subtract(exact.point, given.point), given.axis)) > tolerance:
+        raise InputError(refusal)
     places = places_of(points)
     misfit = _misfit(places, exact)
     if misfit > tolerance or not _lies_in_surface(places, exact, tolerance):
