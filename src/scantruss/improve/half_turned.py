@@ -15,6 +15,7 @@ from ..scan.symmetry import MirrorPlane, three_of
 from .mirrored import LEAST_PIECE, ON_PLANE, Wedge, beyond_axis, refuse_rows, section_of, united, wedge_of
 
 AT_ONE_PLACE = 0.4  #: farthest that a node beyond a line may be from the image of its own [member lengths]
+OF_HALF_TURNS = "the lines of the half turns"
 
 
 def half_turned_wedge(rotation: Rotation, half_turn: Rotation, origin: np.ndarray) -> Wedge:
@@ -70,11 +71,12 @@ def half_turned_grid(grid: Grid, wedge: Wedge, length: float) -> Grid:
     row = np.intersect1d(used, grid.edges[(uses == 1) & (grid.edge_uses == 2)])
     on = used[side[used] == 0]
     for own, ray in zip((row, on), wedge.rays, strict=True):
+        assert ray is not None
         away = nodes[own] - wedge.centre
         off = away - np.outer(away @ ray, ray)
         far = np.linalg.norm(off, axis=1)
         if len(far) and far.max() > ON_PLANE * length:
-            refuse_rows(grid, own[int(far.argmax())])
+            refuse_rows(grid, own[int(far.argmax())], OF_HALF_TURNS)
         nodes[own] -= off
     both = np.intersect1d(row, on)
     nodes[both] = wedge.centre
@@ -102,12 +104,12 @@ def _images_beyond(
     near = apart.argmin(axis=1)
     far = apart.min(axis=1)
     if far.max() > AT_ONE_PLACE * length or len(np.unique(near)) < len(near):
-        refuse_rows(grid, theirs[int(far.argmax())])
+        refuse_rows(grid, theirs[int(far.argmax())], OF_HALF_TURNS)
     beyond[theirs] = own[near]
     image_of = np.arange(len(nodes))
     image_of[theirs], image_of[own[near]] = own[near], theirs
     same = (np.sort(image_of[across], axis=1) == np.sort(across, axis=1)).all(axis=1)
     if not same.all():
-        refuse_rows(grid, across[int(same.argmin())][0])
+        refuse_rows(grid, across[int(same.argmin())][0], OF_HALF_TURNS)
     nodes[own[near]] = (nodes[own[near]] + image) / 2.0
     return beyond

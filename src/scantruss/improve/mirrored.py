@@ -1,4 +1,4 @@
-"""Grids that are exactly symmetric: the part between two mirror planes, or two axes of half turns, cut off along rows there, and its images."""
+"""Grids that are exactly symmetric: the part between two walls, mirror planes or lines of half turns, and its images."""
 
 from __future__ import annotations
 
@@ -30,10 +30,12 @@ class Wedge:
     centre: np.ndarray  #: (3,) on the line
     axis: np.ndarray | None  #: (3,) along the line
     copies: int
-    half_turns: bool = False  #: about straight lines of the surface through `centre`, along each wall, instead of reflections
+    half_turns: bool = (
+        False  #: about straight lines of the surface through `centre`, along each wall, instead of reflections
+    )
 
     def matrices(self) -> list[np.ndarray]:
-        """Return the (3, 3) of all images about `centre`, one after the other around the line: even ones turn, odd ones reflect or turn over."""
+        """Return the (3, 3) of all images about `centre`, one after the other around the line: odd ones reflect or turn over."""
         first = self.walls[0][0]
         mirror = np.eye(3) - 2.0 * np.outer(first, first)
         if self.axis is None:
@@ -192,13 +194,11 @@ def united(
     others = np.flatnonzero(beyond >= 0)
     for k in range(len(matrices)):
         across = matrices[k] @ matrices[1]  # the image beyond the second wall
-        image = int(np.argmin([np.abs(across - each).max() for each in matrices]))
-        number_of[k, others] = number_of[image, beyond[others]]
+        there = int(np.argmin([np.abs(across - each).max() for each in matrices]))
+        number_of[k, others] = number_of[there, beyond[others]]
     back = [0, *range(kept.shape[1] - 1, 0, -1)]  # corners of a panel seen from the other side
     inner = kept[(beyond[kept] < 0).all(axis=1)]  # what lies across a wall is in one of the two images
-    panels = np.concatenate(
-        [number_of[k][kept if k % 2 == 0 else inner[:, back]] for k in range(len(matrices))]
-    )
+    panels = np.concatenate([number_of[k][kept if k % 2 == 0 else inner[:, back]] for k in range(len(matrices))])
     return with_panels(
         grid,
         made,
@@ -345,9 +345,9 @@ def beyond_axis(line: np.ndarray, centre: np.ndarray, ray: np.ndarray) -> list[n
     return pieces
 
 
-def refuse_rows(grid: Grid, node: int) -> None:
-    """Refuse a grid of which the rows do not follow the planes."""
+def refuse_rows(grid: Grid, node: int, lines: str = "the mirror planes") -> None:
+    """Refuse a grid of which the rows do not follow the planes, or other lines."""
     where = ", ".join(f"{c:.5g}" for c in grid.scan_nodes[node])
     raise FrontError(
-        f"the rows do not follow the mirror planes at ({where}); try another --length, or leave --symmetry out", grid
+        f"the rows do not follow {lines} at ({where}); try another --length, or leave --symmetry out", grid
     )

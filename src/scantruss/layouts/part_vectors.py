@@ -84,7 +84,9 @@ class PartVectors(ABC):
         shape = len(both), len(parts)
         misfit, shift = np.empty(shape), np.empty(shape, np.int16)
         others = len(parts) + np.arange(len(parts))
-        turned_misfits(both, square, np.tile(count, 2), np.tile(self.is_open[parts], 2), others, False, self.over, misfit, shift)
+        turned_misfits(
+            both, square, np.tile(count, 2), np.tile(self.is_open[parts], 2), others, False, self.over, misfit, shift
+        )
         return misfit[: len(parts)]
 
     def misfits(

@@ -166,9 +166,7 @@ class Scene:
         around = np.concatenate([places, places[:1]]) if closed else places
         self.lines(name, np.stack([around[:-1], around[1:]], axis=1), np.array(color, np.uint8), width)
 
-    def tubes(
-        self, name: str, ends: np.ndarray, colors: np.ndarray, radius: float, sides: int = TUBE_SIDES
-    ) -> None:
+    def tubes(self, name: str, ends: np.ndarray, colors: np.ndarray, radius: float, sides: int = TUBE_SIDES) -> None:
         """Draw segments (M, 2, 3) as tubes of so many sides."""
         if not len(ends):
             self.remove(name)

@@ -193,7 +193,11 @@ class GridTab:
         radius, sides = (ROD_RADIUS, ROD_SIDES) if as_rods else (TUBE_RADIUS, TUBE_SIDES)
         in_space = bodies or as_rods
         scene.tubes(
-            "/grid/tubes", ends if in_space else ends[:0], of_members if in_space else of_members[:0], radius * size, sides
+            "/grid/tubes",
+            ends if in_space else ends[:0],
+            of_members if in_space else of_members[:0],
+            radius * size,
+            sides,
         )
         kept = np.ones(len(places), bool) if section is None else section.keeps(places)
         drawn = (
