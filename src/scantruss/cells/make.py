@@ -20,7 +20,7 @@ from ..surface.scratch import with_own_scratch
 from .hexagons import TRIANGLE_MEMBER, hexagons_of, made_alike
 
 #: shares of how far nodes may be off the scan with which panels are made planar, until a grid passes; with none it stays as it is
-REACHES = (1.0, 0.5, 0.0)
+SHARES_OFF_SCAN = (1.0, 0.5, 0.0)
 TIMES_ROWS_TRIED = 5  # times that other starts of rows are tried where quads fail the checks
 
 if TYPE_CHECKING:
@@ -113,7 +113,7 @@ def _judged(
         return WorkingMesh.from_grid(some, surface, boundary.curves, boundary.stops, length, lines)
 
     refused: CertificateError | None = None
-    for reach in REACHES:
+    for reach in SHARES_OFF_SCAN:
         mesh, flat = opened(made), plain.replace(before=made.quality)
         if reach:
             flat = make_planar(mesh, made, reach)

@@ -14,7 +14,7 @@ from ..scan.rotation import Rotation, turn_about
 from ..scan.symmetry import MirrorPlane, three_of
 from .mirrored import LEAST_PIECE, ON_PLANE, Wedge, beyond_axis, refuse_rows, section_of, united, wedge_of
 
-AT_ONE_PLACE = 0.4  #: farthest that a node beyond a line may be from the image of its own [member lengths]
+NEAR_IMAGE = 0.4  #: farthest that a node beyond a line may be from the image of its own [member lengths]
 OF_HALF_TURNS = "the lines of the half turns"
 
 
@@ -103,7 +103,7 @@ def _images_beyond(
     apart = np.linalg.norm(image[:, None] - nodes[own], axis=2)
     near = apart.argmin(axis=1)
     far = apart.min(axis=1)
-    if far.max() > AT_ONE_PLACE * length or len(np.unique(near)) < len(near):
+    if far.max() > NEAR_IMAGE * length or len(np.unique(near)) < len(near):
         refuse_rows(grid, theirs[int(far.argmax())], OF_HALF_TURNS)
     beyond[theirs] = own[near]
     image_of = np.arange(len(nodes))

@@ -30,9 +30,7 @@ class Wedge:
     centre: np.ndarray  #: (3,) on the line
     axis: np.ndarray | None  #: (3,) along the line
     copies: int
-    half_turns: bool = (
-        False  #: about straight lines of the surface through `centre`, along each wall, instead of reflections
-    )
+    half_turns: bool = False  #: about lines of the surface along each wall, instead of reflections
 
     def matrices(self) -> list[np.ndarray]:
         """Return the (3, 3) of all images about `centre`, one after the other around the line: odd ones reflect or turn over."""

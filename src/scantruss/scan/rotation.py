@@ -24,8 +24,8 @@ MOST_TURNS = 6  #: parts that a turn makes, at most: rows of members run along t
 ROTATION_STEPS = 10  #: Gauss-Newton steps of an axis
 HALF_TURN_STEP = 2.0  #: between the axes of half turns that are tried [degree]
 LEAST_OF_LINE = 0.5  #: of the axis of a half turn that has points of the scan beside it
-EXACT = 1e-9  #: rounding of axes and points that were found before, over their size
-SQUARE = 0.01  #: cosine of the angle between the axes of a rotation and a half turn, at most
+LAST_DIGITS = 1e-9  #: rounding of axes and points that were found before, over their size
+MOST_OBLIQUE = 0.01  #: cosine of the angle between the axes of a rotation and a half turn, at most
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Rotation:
         """Return the rotation that a row of settings holds, its misfit not known."""
         axis = np.array(row[3:6], float)
         size = float(np.linalg.norm(axis))
-        axis = axis if abs(size - 1.0) < EXACT else axis / size  # that of saved settings stays to the last digit
+        axis = axis if abs(size - 1.0) < LAST_DIGITS else axis / size  # that of saved settings stays to the last digit
         return cls(three_of(np.array(row[:3], float)), three_of(oriented(axis)), round(row[6]), 0.0)
 
     def matrix(self, times: int = 1) -> np.ndarray:
@@ -141,11 +141,11 @@ def check_half_turn(points: np.ndarray, rotation: Rotation, row: Sequence[float]
     """Return the half turn that the user gives beside a rotation, if the scan has it; see `find_half_turn`."""
     given = Rotation.of_row(row)
     refusal = "the axis of the half turn must meet that of the rotation squarely"
-    if abs(float(np.dot(given.axis, rotation.axis))) > SQUARE:
+    if abs(float(np.dot(given.axis, rotation.axis))) > MOST_OBLIQUE:
         raise InputError(refusal)
     exact = _squared(rotation, given)
     off = np.abs(np.subtract((*exact.point, *exact.axis), (*given.point, *given.axis)))
-    exact = given if off.max() < EXACT * (1.0 + np.abs(given.point).max()) else exact
+    exact = given if off.max() < LAST_DIGITS * (1.0 + np.abs(given.point).max()) else exact
     if np.linalg.norm(np.cross(np.subtract(exact.point, given.point), given.axis)) > tolerance:
         raise InputError(refusal)
     places = places_of(points)

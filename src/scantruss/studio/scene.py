@@ -33,7 +33,7 @@ BEADS, BEAD_SIZE = (
     (3, 12),
     0.45,
 )  #: points of such a member at least and at most, and how large they are [their distance]
-MOST_RODS = 20_000  #: members of layers that are drawn as rods; more are points
+MOST_DRAWN_RODS = 20_000  #: members of layers that are drawn as rods; more are points
 TUBE_SIDES, ROD_SIDES = 8, 3
 BODY_GAMMA, PANEL_GAMMA = 2.2, 1.45  #: exponents of colours, see `lit`
 SKY_LIGHT = 0.3  #: share of the light that comes from the sky
@@ -272,7 +272,7 @@ def is_layered(model: Model) -> bool:
 
 def drawn_as_rods(model: Model, number: int) -> bool:
     """Whether so many members of a model are drawn as rods: of layers, which points do not show, and too many for lines."""
-    return is_layered(model) and MOST_DRAWN_LINES < number <= MOST_RODS
+    return is_layered(model) and MOST_DRAWN_LINES < number <= MOST_DRAWN_RODS
 
 
 def lit(colors: np.ndarray, gamma: float) -> np.ndarray:
