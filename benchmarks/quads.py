@@ -11,6 +11,7 @@ import numpy as np
 
 import scantruss as st
 from scantruss.boundary.find import find_boundary
+from scantruss.cells.make import settings_of_triangles
 from scantruss.grid.grid import Grid
 from scantruss.grid.panels import planarity_of
 from scantruss.pipeline import grid_from_cloud
@@ -66,7 +67,7 @@ def distance_to_node(place: np.ndarray, grid: Grid) -> float:
 
 def evenness(grid: Grid, cloud: PointCloud, settings: st.Settings, seconds: float, alone: float) -> Evenness:
     """Measure a grid against the boundary curves of its scan."""
-    plain = settings.replace(cells="triangle", planar=False, rows="boundary")
+    plain = settings_of_triangles(settings).replace(cells="triangle", planar=False, rows="boundary")
     _, boundary = find_boundary(sample_surface(cloud, plain), plain)
     rim = grid.edges[grid.edge_uses == 1]
     starts, ends = grid.nodes[rim[:, 0]], grid.nodes[rim[:, 1]]

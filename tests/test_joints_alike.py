@@ -1,6 +1,7 @@
 """Few joints: misfits against a slow twin, fewer kinds, symmetry and surface kept, and the command."""
 
 import json
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -17,12 +18,12 @@ from scantruss.scan.rotation import turn_about
 
 
 def best_misfit(one: np.ndarray, other: np.ndarray, turns: int = 7200) -> float:
-    """The least root mean square between unit vectors in frames with z along the normals, trying many turns and all shifts."""
+    """The least root mean square between unit vectors in frames with z along the normals, trying many turns, all shifts and both sides."""
     angle = np.linspace(0, 2 * np.pi, turns, endpoint=False)
     c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
     best = np.inf
-    for k in range(len(one)):
-        x, y, z = np.roll(one, -k, axis=0).T
+    for k, side in product(range(len(one)), (one, one[::-1] * [1, -1, -1])):
+        x, y, z = np.roll(side, -k, axis=0).T
         turned = np.stack([c * x - s * y, s * x + c * y, np.broadcast_to(z, (turns, len(z)))], axis=2)
         best = min(best, float(np.sqrt(((turned - other) ** 2).sum(axis=2).mean(axis=1)).min()))
     return best
@@ -40,7 +41,7 @@ def test_misfits_are_those_of_the_best_turn() -> None:
     for one in inner.tolist():
         for column, other in enumerate(inner.tolist()):
             assert misfit[one, column] == pytest.approx(best_misfit(own[one, :6], own[other, :6]), abs=1e-5)
-            assert 0 <= shift[one, column] < 6
+            assert shift[one, column] // 6 in (0, 2)  # turned, or turned over
     ends = {frozenset((v, u)) for v in range(len(grid.nodes)) for u in stars.ring[v].tolist() if u >= 0}
     assert ends == {frozenset(edge) for edge in grid.edges.tolist()}
     assert sizes[stars.ring >= 0] == pytest.approx(
@@ -98,7 +99,8 @@ def test_members_stay_as_even_as_is_asked_for_or_as_they_were(bound: float) -> N
 
 
 def test_mirror_images_of_joints_are_of_one_kind_where_it_is_asked_for() -> None:
-    grid = three_parts()
+    flat = three_parts()  # of which mirror images are the same turned over
+    grid = flat.replace(nodes=flat.nodes * [1, 1, 0] - [0, 0, 0.1] * (flat.nodes**2).sum(axis=1, keepdims=True))
     both = grid.replace(
         nodes=np.concatenate([grid.nodes, grid.nodes * [-1, 1, 1] + [9, 0, 0]]),
         triangles=np.concatenate([grid.triangles, grid.triangles[:, ::-1] + len(grid.nodes)]),
@@ -108,6 +110,31 @@ def test_mirror_images_of_joints_are_of_one_kind_where_it_is_asked_for() -> None
     assert same.before < apart.before and same.mirrored.any() and not apart.mirrored.any()
     assert same.before <= st.few_joints(grid, 1e-3, 999).before
     assert same.misfit.max() <= 1e-3 and np.array_equal(same.grid.nodes, both.nodes)
+
+
+def with_turned_over(grid: st.Grid) -> st.Grid:
+    """A grid and beside it the same turned over, both with their outsides up."""
+    return grid.replace(
+        nodes=np.concatenate([grid.nodes, grid.nodes * [1, -1, -1] + [0, 40, 0]]),
+        triangles=np.concatenate([grid.triangles, grid.triangles[:, ::-1] + len(grid.nodes)]),
+        fixed=np.zeros(2 * len(grid.nodes), bool),
+    )
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_joints_that_are_turned_over_are_of_one_kind(mirrored: bool) -> None:
+    grid = uneven(6)
+    both = with_turned_over(grid)
+    once, twice = (st.few_joints(each, 1e-3, 999, mirrored=mirrored) for each in (grid, both))
+    assert once.before == twice.before and np.array_equal(twice.of[: len(grid.nodes)], twice.of[len(grid.nodes) :])
+    assert twice.misfit.max() <= 1e-3 and not (twice.mirrored.any() and not mirrored)
+    stars = stars_of(both)
+    directions = stars.vectors(both.nodes)
+    misfit, shift = stars.misfits(directions, twice.representative, mirrored=mirrored)
+    every = np.arange(len(both.nodes))
+    near = misfit.argmin(axis=1)
+    aims = alike._aims(stars, directions, near, shift[every, near], misfit.min(axis=1) < 1e-3, len(twice.counts))
+    assert aims == pytest.approx(directions, abs=2e-3)
 
 
 def three_parts() -> st.Grid:

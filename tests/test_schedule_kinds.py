@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from small_grids import uneven
+from test_joints_alike import with_turned_over
 from test_layouts_of_quads import grid_of, honeycomb, vault
 from test_schedules import TUBE
 
@@ -82,6 +83,27 @@ def test_types_are_the_kinds_that_parts_were_made_alike_to(
         each for each in tables_of(model_of_grid(again))["panels" if of_panels else "nodes"] if each.name == "kind"
     )
     assert max(kind.values) == len(found.counts)
+
+
+def test_a_ball_that_is_turned_over_is_of_the_same_type_and_its_members_go_into_the_same_holes() -> None:
+    grid = with_turned_over(uneven(6))
+    made = st.schedule(st.few_joints(grid, 1e-3, AS_THEY_ARE).grid, TUBE, keep_failed=True)
+    half = len(grid.nodes) // 2
+    assert made.nodes["node type"][:half] == made.nodes["node type"][half:]
+    own = np.array([made.drilling[f"ball {axis}"] for axis in "xyz"], float).T
+    holes: dict[Any, dict[Any, np.ndarray]] = {}
+    for node, hole, direction in zip(made.drilling["node"], made.drilling["hole"], own, strict=True):
+        holes.setdefault(node, {})[hole] = direction
+    one = dict(zip(made.node_types["node type"], made.node_types["representative"], strict=True))
+    kind = dict(zip(made.nodes["node"], made.nodes["node type"], strict=True))
+    for node in made.nodes["node"]:
+        pairs = [
+            (direction, holes[one[kind[node]]][hole])
+            for each, hole, direction in zip(made.drilling["node"], made.drilling["hole of type"], own, strict=True)
+            if each == node
+        ]
+        mine, theirs = np.array(pairs).transpose(1, 0, 2)
+        assert np.abs(mine @ mine.T - theirs @ theirs.T).max() < 5e-3
 
 
 def two_quads(second: np.ndarray) -> st.Grid:

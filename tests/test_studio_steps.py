@@ -1,6 +1,8 @@
 """The studio without a browser: steps taken back, browsers apart, holes and ridges switched, what lies under a click, colours."""
 
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +14,7 @@ from scantruss.studio.features import HOLES, RIDGES, find_features, switched_off
 from scantruss.studio.frame import SceneFrame, SectionPlane
 from scantruss.studio.outputs import project_file, settings_files
 from scantruss.studio.picking import nearest_member, nearest_panel, pick
-from scantruss.studio.scene import turns_from_z
+from scantruss.studio.scene import Scene, drawn_as_rods, turns_from_z
 from scantruss.studio.session import Session
 from scantruss.studio.tone import seen, to_be_seen
 
@@ -234,6 +236,39 @@ def test_tubes_turn_from_z_to_their_members() -> None:
     w, x, y, z = turns_from_z(ahead).T
     turned = np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x**2 + y**2)], axis=1)
     assert np.allclose(turned, ahead, atol=1e-6)
+
+
+@pytest.mark.parametrize("sides", [3, 8])
+def test_a_tube_lies_around_its_member_and_is_closed_around(sides: int) -> None:
+    drawn = dict[str, Any]()
+
+    def draw(name: str, corners: np.ndarray, faces: np.ndarray, *others: Any, **more: Any) -> None:
+        drawn[name] = corners, faces
+
+    api = SimpleNamespace(
+        add_batched_meshes_simple=draw,
+        set_up_direction=lambda way: None,
+        configure_environment_map=lambda *_, **__: None,
+        configure_default_lights=lambda *_, **__: None,
+        add_light_ambient=lambda *_, **__: None,
+        set_background_image=lambda _: None,
+        remove_by_name=lambda _: None,
+    )
+    ends = np.array([[[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]]])
+    Scene(api).tubes("/tubes", ends, np.zeros((1, 3), np.uint8), 0.1, sides)
+    corners, faces = drawn["/tubes"]
+    assert np.hypot(corners[:, 0], corners[:, 1]) == pytest.approx(1.0) and set(corners[:, 2].tolist()) == {0.0, 1.0}
+    a, b, c = corners[faces.astype(int)].transpose(1, 0, 2)
+    area = np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2
+    assert area == pytest.approx(2 * sides * np.sin(np.pi / sides))  # of all sides, none twice
+    assert (np.einsum("tc,tc->t", np.cross(b - a, c - a), (a + b + c) * [1, 1, 0]) > 0).all()  # seen from outside
+
+
+def test_layers_are_seen_as_rods_where_there_are_too_many_members_for_lines() -> None:
+    layered: Any = SimpleNamespace(truss=SimpleNamespace(layers=np.zeros(3)))
+    single: Any = SimpleNamespace(truss=SimpleNamespace(layers=None))
+    rods = [drawn_as_rods(layered, number) for number in (4_000, 4_001, 20_000, 20_001)]
+    assert rods == [False, True, True, False] and not drawn_as_rods(single, 9_000)
 
 
 def test_a_grid_does_not_differ_from_itself(roof: Session) -> None:

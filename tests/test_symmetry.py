@@ -11,7 +11,7 @@ import scantruss as st
 from scantruss.cli.main import main
 from scantruss.errors import FrontError, InputError
 from scantruss.grid.panels import planarity_of
-from scantruss.scan.rotation import check_rotation, find_rotation, turn_about
+from scantruss.scan.rotation import check_half_turn, check_rotation, find_half_turn, find_rotation, turn_about
 from scantruss.scan.symmetry import check_mirror_planes, find_mirror_planes, nearest_mirror_plane
 from scantruss.schedules.joints import node_normals
 
@@ -177,9 +177,11 @@ def test_the_command_takes_planes_of_a_file(
     for text, reason in (
         (
             "500,-200,0,0,0,1,2\n0,0,0,0,0,1,2",
-            "a rotation stands alone and needs a point, an axis and the parts of a turn, 2 to 12",
+            "the axis of the half turn must meet that of the rotation squarely",
         ),
-        ("500,-200,0,0,0,1,1", "a rotation stands alone and needs a point, an axis and the parts of a turn, 2 to 12"),
+        ("500,-200,0,0,0,1,2\n500,-200,0,1,0,0,3", "a rotation stands alone or before a half turn"),
+        ("500,-200,0,0,0,1,2\n500,-200,40,1,0,0,2", "or the axis is no line of the surface"),
+        ("500,-200,0,0,0,1,1", "a rotation needs a point, an axis and the parts of a turn, 2 to 12"),
         ("500,-200,0,0,0,1,3", "the scan is not the same when it is turned by 360/3 degrees about the axis"),
         ("500,-200,0", "line 1: a mirror plane needs six numbers"),
         ("0,0,0,0,0,0", "a mirror plane needs a point and a normal"),
@@ -256,3 +258,71 @@ def test_the_grid_of_a_pinwheel_is_itself_when_turned(cells: str) -> None:
     assert len(grid.lines) == 0 and not grid.line_sets  # the seams are no lines
     again = st.grid_from_points(pinwheel(), grid.settings)
     assert np.array_equal(again.nodes, grid.nodes) and np.array_equal(again.triangles, grid.triangles)
+
+
+TILT = turn_about(np.array([0.6, 0.8, 0.0]), 0.3)
+CENTRE = np.array([40.0, -7.0, 3.0])
+
+
+def hypar(twist: float = 0.0) -> np.ndarray:
+    """A saddle over a square of 20 whose edges and middle lines are straight, tilted; twisted it keeps the rotation alone."""
+    u, v = (each.ravel() for each in np.meshgrid(np.linspace(-10, 10, 90), np.linspace(-10, 10, 90)))
+    z = 0.03 * u * v + twist * (u**2 + v**2)
+    return np.stack([u, v, z], axis=1) @ TILT.T + CENTRE
+
+
+def test_half_turns_about_the_straight_lines_of_a_saddle_are_found() -> None:
+    rotation = find_rotation(hypar(), 0.1)
+    found = find_half_turn(hypar(), rotation, 0.1)
+    assert rotation.order == 2 and found is not None and found.order == 2 and found.misfit < 0.02
+    u, v = np.abs(TILT.T @ found.axis)[:2]
+    assert max(u, v) == pytest.approx(1, abs=1e-5) and abs(float(np.dot(found.axis, rotation.axis))) < 1e-12
+    assert found.point == pytest.approx(CENTRE, abs=0.03)
+    again = check_half_turn(hypar(), rotation, found.row, 0.1)
+    assert again.axis == pytest.approx(found.axis, abs=1e-12)
+
+
+def test_surfaces_without_straight_lines_have_no_half_turns() -> None:
+    twisted = hypar(0.01)
+    rotation = find_rotation(twisted, 0.1)
+    assert find_half_turn(twisted, rotation, 0.1) is None
+    with pytest.raises(InputError, match="when it is turned over about the axis of the half turn"):
+        check_half_turn(twisted, rotation, (*rotation.point, *(TILT @ [1.0, 0.0, 0.0]), 2.0), 0.1)
+    with pytest.raises(InputError, match="must meet that of the rotation squarely"):
+        check_half_turn(hypar(), find_rotation(hypar(), 0.1), (*CENTRE, *(TILT @ [1.0, 0.0, 0.4]), 2.0), 0.1)
+    ball = np.random.default_rng(4).normal(size=(40_000, 3)) * [1.0, 1.0, 1.2]
+    ball /= np.linalg.norm(ball / [1.0, 1.0, 1.2], axis=1, keepdims=True)
+    about = find_rotation(ball, 0.01)  # half a turn about an axis that pierces it leaves it as it is too
+    assert find_half_turn(ball, about, 0.01) is None
+
+
+@compiled_only
+@pytest.mark.parametrize("cells", ["triangle", "quad", "hexagon"])
+def test_a_saddle_is_of_four_parts_to_rounding(cells: str) -> None:
+    length = {"triangle": 2.0, "quad": 2.0, "hexagon": 1.155}[cells]
+    settings = st.Settings(length=length, symmetry="rotation", effort="quick", cells=cells)
+    grid = st.grid_from_points(hypar(), settings)
+    assert grid.certificate is not None and grid.certificate.passed and grid.settings is not None
+    assert grid.topology.manifold and grid.topology.orientable and grid.cells == cells
+    rows = grid.settings.symmetry
+    assert not isinstance(rows, str) and [row[6] for row in rows] == [2.0, 2.0]
+    members = {frozenset(pair) for pair in grid.edges.tolist()}
+    panels = {frozenset(panel) for panel in grid.panel_loops}
+    for row in rows:
+        centre, turn = np.array(row[:3]) - grid.origin, turn_about(np.array(row[3:6]), np.pi)
+        apart, image = cKDTree(grid.nodes).query((grid.nodes - centre) @ turn.T + centre)
+        assert apart.max() < 1e-9 and len(np.unique(image)) == len(image)
+        assert {frozenset(image[list(pair)].tolist()) for pair in members} == members
+        assert {frozenset(image[list(panel)].tolist()) for panel in panels} == panels
+    assert len(np.unique(np.round(grid.lengths, 7))) < 0.35 * len(grid.lengths)
+    assert len(grid.lines) == 0 and not grid.line_sets
+    again = st.grid_from_points(hypar(), grid.settings)
+    assert np.array_equal(again.nodes, grid.nodes) and np.array_equal(again.triangles, grid.triangles)
+
+
+def test_a_rotation_stands_alone_or_before_a_half_turn() -> None:
+    rotation, half, plane = (0, 0, 0, 0, 0, 1, 3), (0, 0, 0, 1, 0, 0, 2), (0, 0, 0, 1, 0, 0)
+    assert len(st.Settings(length=1.0, symmetry=[rotation, half]).symmetry) == 2
+    for rows in ([half, rotation], [rotation, plane], [rotation, half, half]):
+        with pytest.raises(InputError, match="a rotation stands alone or before a half turn"):
+            st.Settings(length=1.0, symmetry=rows)

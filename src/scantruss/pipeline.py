@@ -130,13 +130,13 @@ def symmetric_grid(
     FrontError
         No grid passes the checks, or the rows do not follow the edges of the part.
     """
-    from .improve.symmetric import EDGE_LINE, check_boundary_kept, find_symmetry
+    from .improve.symmetric import EDGE_LINE, check_boundary_kept, find_symmetries
 
-    symmetry = find_symmetry(np.asarray(cloud.points) + cloud.origin, settings)
+    symmetries = find_symmetries(np.asarray(cloud.points) + cloud.origin, settings)
     plain = settings.replace(symmetry="")
     refused: FrontError | None = None
     surface = grid_from_cloud(cloud, plain.replace(cells="triangle", rows="boundary", planar=False), progress=progress)
-    for lines in symmetry.edges(surface, settings.length):
+    for symmetry, lines in ((each, lines) for each in symmetries for lines in each.edges(surface, settings.length)):
         names = plain.line_names or [f"line {number}" for number in range(1, len(plain.fixed_lines) + 1)]
         lined = plain.replace(
             fixed_lines=[*plain.fixed_lines, *(line.tolist() for line in lines)],
@@ -172,11 +172,18 @@ def symmetric_hexagons(
         No grid passes the checks.
     """
     from .improve.mirrored import without_edge_lines
-    from .improve.symmetric import find_symmetry
+    from .improve.symmetric import find_symmetries
 
-    rows = find_symmetry(np.asarray(cloud.points) + cloud.origin, settings).rows
-    asked = settings_of_triangles(settings).replace(cells="triangle", planar=False, symmetry=rows)
-    triangles = symmetric_grid(cloud, asked, progress=progress)
+    *others, last = (each.rows for each in find_symmetries(np.asarray(cloud.points) + cloud.origin, settings))
+    asked = settings_of_triangles(settings).replace(cells="triangle", planar=False, symmetry=last)
+    for rows in others:
+        try:
+            triangles = symmetric_grid(cloud, asked.replace(symmetry=rows), progress=progress)
+            break
+        except FrontError:
+            continue
+    else:
+        triangles = symmetric_grid(cloud, asked, progress=progress)
     own = triangles.settings or asked
     samples, boundary = find_boundary(sample_surface(cloud, own), own, progress=progress)
     boundary, constraints = find_constraints(samples, boundary, own, ())

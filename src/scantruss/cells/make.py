@@ -19,6 +19,8 @@ from ..runtime.progress import Progress
 from ..surface.scratch import with_own_scratch
 from .hexagons import TRIANGLE_MEMBER, hexagons_of, made_alike
 
+#: shares of how far nodes may be off the scan with which panels are made planar, until a grid passes; with none it stays as it is
+SHARES_OFF_SCAN = (1.0, 0.5, 0.0)
 TIMES_ROWS_TRIED = 5  # times that other starts of rows are tried where quads fail the checks
 
 if TYPE_CHECKING:
@@ -103,18 +105,26 @@ def _judged(
 
     surface = with_own_scratch(samples.surface)
     lines, length = constraints.lines, settings.length
-    images = Images.of_grid(made.replace(settings=settings))
+    images, plain = Images.of_grid(made.replace(settings=settings)), made
     made = at_stops(made, boundary.stops, length)  # or corners, which were projected onto the scan, would slide
     made = at_stops(made, lines.stops, length, np.unique(made.lines))
 
     def opened(some: Grid) -> WorkingMesh:
         return WorkingMesh.from_grid(some, surface, boundary.curves, boundary.stops, length, lines)
 
-    mesh = opened(made)
-    flat = make_planar(mesh, made)
-    flat = flat.replace(deviation=mesh.deviation()[: len(made.nodes)].copy(), desired=made.desired, before=made.quality)
-    flat = made_alike(flat, images, opened)
-    return certified_cells(flat.replace(settings=settings), samples, boundary, settings)
+    refused: CertificateError | None = None
+    for reach in SHARES_OFF_SCAN:
+        mesh, flat = opened(made), plain.replace(before=made.quality)
+        if reach:
+            flat = make_planar(mesh, made, reach)
+            off = mesh.deviation()[: len(made.nodes)].copy()
+            flat = made_alike(flat.replace(deviation=off, desired=made.desired, before=made.quality), images, opened)
+        try:
+            return certified_cells(flat.replace(settings=settings), samples, boundary, settings)
+        except CertificateError as error:
+            refused = refused or error
+    assert refused is not None
+    raise refused
 
 
 def certified_cells(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings: Settings) -> Grid:

@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix, vstack
-from scipy.sparse.linalg import splu
 
 from ..grid.grid import Grid
 from ..grid.panels import (
@@ -25,7 +24,8 @@ from ..grid.panels import (
 )
 from ..improve.working_mesh import WorkingMesh
 from ..kernels.mesh.grid import AT_REST, INTERIOR, ON_CURVE
-from ..kernels.surface.local_surface import NORMAL, onto_patch
+from ..kernels.surface.local_surface import NORMAL, feet_on_patches
+from .factor import factored
 from .stops import slide_back, ways_along
 
 FARTHEST_OFF_SCAN = 0.1  # distance of a node from the scan up to which panels are made planar [members]
@@ -41,6 +41,7 @@ BRACED = 0.2  # share of that weight for the ways across panels, which keep them
 LEAST_LEFT = 0.7  # share of its length that each member keeps
 SHORTEST_LEFT = 0.51  # length to which members may become shorter, more than the certificate asks for [desired lengths]
 WIDEST_IN_ROUND = 178.0  # angle within a panel up to which a round counts [degree]
+UNSOUND_ROUNDS = 3  # in a row, after which harder pulls do not help
 HELD_FAST = 1e3  # weight of what does not move
 SET_ASIDE = 1.2  # growth of the coefficient of variation of the lengths up to which a round counts
 LEAST_VARIATION = 0.01  # coefficient of variation that any grid may have
@@ -53,7 +54,7 @@ class Feet(NamedTuple):
     off: np.ndarray  #: (V,) distance along it, with its sign [scan unit]
 
 
-def make_planar(mesh: WorkingMesh, grid: Grid) -> Grid:
+def make_planar(mesh: WorkingMesh, grid: Grid, reach: float = 1.0) -> Grid:
     """Return a grid with its panels as planar as nodes within a tenth of a member of the scan and even lengths allow.
 
     Nodes of the boundary and of lines slide. The grid is returned as it is if nothing is gained.
@@ -64,7 +65,10 @@ def make_planar(mesh: WorkingMesh, grid: Grid) -> Grid:
         The grid opened; its node k is node k of the grid. Its nodes are moved.
     grid : Grid
         Of quads or hexagons, on the scan.
+    reach : float
+        Share of the tenth of a member that nodes may be off the scan, above 0 to 1.
     """
+    most_off = reach * HOLD * FARTHEST_OFF_SCAN
     net, count, panels = mesh.net, len(grid.nodes), grid.panel_table
     nodes, kind = net.nodes[:count], net.kind[:count]
     target = mesh.length * net.desired[:count]
@@ -78,8 +82,9 @@ def make_planar(mesh: WorkingMesh, grid: Grid) -> Grid:
     widest = max(WIDEST_IN_ROUND, float(np.nanmax(angles, initial=0.0)) + 1.0)  # those that stay turn a little
     wide = panels[(np.where(panels >= 0, angles, 0.0) > WIDEST_IN_ROUND).any(axis=1)]
     kind[wide[wide >= 0]] = AT_REST  # such panels would turn over
-    kind[np.abs(_feet(mesh, count).off) > HOLD * FARTHEST_OFF_SCAN * target] = AT_REST  # where the scan is not smooth
+    kind[np.abs(_feet(mesh, count).off) > most_off * target] = AT_REST  # where the scan is not smooth
     best, least = nodes.copy(), _bent(nodes, panels)
+    unsound = 0
     for number in range(PLANAR_ROUNDS):
         pull = FIRST_PULL * (LAST_PULL / FIRST_PULL) ** (number / (PLANAR_ROUNDS - 1))
         feet = _feet(mesh, count)
@@ -87,19 +92,21 @@ def make_planar(mesh: WorkingMesh, grid: Grid) -> Grid:
             _weighed(*_planes(nodes, panels), np.sqrt(pull)),
             _lengths_kept(nodes, ends, lengths),
             _weighed(*_lengths_kept(nodes, braces, spans), BRACED),
-            _near_scan(feet, kind, target),
+            _near_scan(feet, kind, target, most_off),
             _held(kind, ways_along(nodes, rails), target),
         ]
         matrix = vstack([rows for rows, _ in parts]).tocsc()
         aim = np.concatenate([values for _, values in parts])
-        move = splu((matrix.T @ matrix).tocsc()).solve(matrix.T @ aim).reshape(-1, 3)
+        move = factored((matrix.T @ matrix).tocsc()).solve(matrix.T @ aim).reshape(-1, 3)
         nodes += np.where((kind >= AT_REST)[:, None], 0.0, move)  # fixed nodes and corners not even by a little
         slide_back(mesh, count)
-        _bring_back(mesh, count, target)
+        _bring_back(mesh, count, most_off * target)
         bent = _bent(nodes, panels)
-        if bent < least and _is_sound(nodes, grid, shortest, widest, most_uneven):
+        sound = _is_sound(nodes, grid, shortest, widest, most_uneven)
+        unsound = 0 if sound else unsound + 1
+        if sound and bent < least:
             best, least = nodes.copy(), bent
-        if least == 0.0:
+        if least == 0.0 or unsound == UNSOUND_ROUNDS:
             break
     nodes[:] = best
     return grid.replace(nodes=best)
@@ -127,15 +134,15 @@ def _feet(mesh: WorkingMesh, count: int) -> Feet:
     """Return where the first `count` nodes are against the scan."""
     mesh.renew(0.3)
     nodes, patches = mesh.net.nodes[:count], mesh.patches[:count]
-    foot = np.array([onto_patch(patch, tuple(place)) for patch, place in zip(patches, nodes.tolist(), strict=True)])
+    foot = np.empty((count, 3))
+    feet_on_patches(patches, nodes, foot)
     normal = patches[:, NORMAL : NORMAL + 3].copy()
     return Feet(normal, ((nodes - foot) * normal).sum(axis=1))
 
 
-def _bring_back(mesh: WorkingMesh, count: int, target: np.ndarray) -> None:
-    """Bring nodes inside that are too far off the scan as near as is allowed."""
+def _bring_back(mesh: WorkingMesh, count: int, most: np.ndarray) -> None:
+    """Bring nodes inside that are farther off the scan than is allowed (V,) as near as that."""
     feet, kind = _feet(mesh, count), mesh.net.kind[:count]
-    most = HOLD * FARTHEST_OFF_SCAN * target
     beyond = np.where(kind == INTERIOR, feet.off - np.clip(feet.off, -most, most), 0.0)
     mesh.net.nodes[:count] -= beyond[:, None] * feet.normal
 
@@ -173,7 +180,7 @@ def _lengths_kept(nodes: np.ndarray, ends: np.ndarray, lengths: np.ndarray) -> t
     """Return what keeps the members as long as they were [their lengths]."""
     way = nodes[ends[:, 1]] - nodes[ends[:, 0]]
     size = np.linalg.norm(way, axis=1)
-    way /= (size * lengths)[:, None]
+    way /= np.maximum(size * lengths, 1e-300)[:, None]
     return _rows(ends, np.stack([-way, way], axis=1), len(nodes)), (lengths - size) / lengths
 
 
@@ -188,10 +195,10 @@ def _braces(panels: np.ndarray) -> np.ndarray:
     return np.array(sorted(found), np.int64).reshape(-1, 2)
 
 
-def _near_scan(feet: Feet, kind: np.ndarray, target: np.ndarray) -> tuple[csr_matrix, np.ndarray]:
+def _near_scan(feet: Feet, kind: np.ndarray, target: np.ndarray, most: float) -> tuple[csr_matrix, np.ndarray]:
     """Return what holds nodes inside near the scan, hardly so within what is allowed [members]."""
     some = np.flatnonzero(kind == INTERIOR)
-    off, most = feet.off[some] / target[some], HOLD * FARTHEST_OFF_SCAN
+    off = feet.off[some] / target[some]
     beyond = np.abs(off) > most
     weight = np.sqrt(np.where(beyond, BACK_TO_SCAN, NEAR_SCAN))
     aim = np.where(beyond, np.sign(off) * most, 0.0) - off

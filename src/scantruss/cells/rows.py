@@ -14,12 +14,12 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import coo_matrix, csc_matrix, diags
-from scipy.sparse.linalg import SuperLU, splu
 from scipy.spatial import cKDTree
 
 from ..improve.working_mesh import WorkingMesh
 from ..kernels.surface.local_surface import HEIGHTS, NORMAL, TANGENT
 from ..scan.vectors import dots
+from .factor import factored
 from .fine_mesh import ALONG, AT_REST_THERE, FineMesh
 from .stops import ways_along
 
@@ -180,19 +180,13 @@ def _directions(
         aim, strength = np.where(led, aim, wanted), np.where(led, strength, share**2 * guide.weight)
     if not strength.any():
         aim[0], strength[0] = 1.0, 1e-3
-    field = _factored(laplacian, strength + 1e-9).solve(strength * aim)
+    field = factored(laplacian + diags(strength + 1e-9, format="csc")).solve(strength * aim)
     rate = 1.0 / diffusion
-    solver = _factored(laplacian, strength + rate)
+    solver = factored(laplacian + diags(strength + rate, format="csc"))
     for _ in range(DIRECTION_TURNS):
         unit = field / np.maximum(np.abs(field), 1e-300)
         field = solver.solve(strength * aim + rate * unit)
     return np.angle(field) / 4
-
-
-def _factored(matrix: csc_matrix, pull: np.ndarray) -> SuperLU:
-    """Return the factors of a matrix with more on its diagonal, which is positive definite and needs no pivots."""
-    pulled = matrix + diags(pull, format="csc")
-    return splu(pulled, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
 
 
 def _distances_from(mesh: FineMesh, some: np.ndarray) -> np.ndarray:
@@ -238,9 +232,9 @@ def _lattice(
     aim = np.zeros((count, 2, 2))
     aim[:, :, 0] = 1.0
     held = pull * aim.ravel()
-    field = _factored(matrix, pull + 1e-6).solve(held)
+    field = factored(matrix + diags(pull + 1e-6, format="csc")).solve(held)
     rate = 1.0 / diffusion
-    solver = _factored(matrix, pull + rate)
+    solver = factored(matrix + diags(pull + rate, format="csc"))
     for _ in range(LATTICE_TURNS):
         pairs = field.reshape(-1, 2)
         unit = pairs / np.maximum(np.linalg.norm(pairs, axis=1, keepdims=True), 1e-300)

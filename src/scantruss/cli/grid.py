@@ -219,6 +219,11 @@ def grid_with_notes(
 def words_of_symmetry(rows: Sequence[Sequence[float]]) -> str:
     """Return which symmetry a grid keeps, in words."""
     words = "; ".join(", ".join(f"{c:.4g}" for c in row) for row in rows)
+    if len(rows[0]) == ROTATION_NUMBERS and len(rows) == 2:
+        return (
+            f"the same when turned by 360/{rows[0][-1]:.0f} degrees about an axis, and turned over about a line of the surface,"
+            f" as points, axes and parts: {words}"
+        )
     if len(rows[0]) == ROTATION_NUMBERS:
         return f"the same when turned by 360/{rows[0][-1]:.0f} degrees about an axis, as point, axis and parts: {words}"
     return f"symmetric in {len(rows)} mirror plane{'s' * (len(rows) != 1)}, as point and normal: {words}"

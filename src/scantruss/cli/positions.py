@@ -39,7 +39,8 @@ def read_positions(path: str | Path) -> list[Position]:
 def read_planes(path: str | Path) -> tuple[tuple[float, ...], ...]:
     """Return the symmetry in a text file, any separator, `#` before comments.
 
-    Mirror planes are a point and a normal, six numbers a line; a rotation is one line of a point, an axis and the parts of a turn.
+    Mirror planes are a point and a normal, six numbers a line; a rotation is one line of a point, an axis and the parts of a turn,
+    and perhaps a second one of a half turn.
 
     Raises
     ------

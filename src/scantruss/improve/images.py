@@ -10,6 +10,7 @@ from ..grid.grid import Grid
 from ..scan.rotation import Rotation
 from ..scan.symmetry import MirrorPlane, three_of
 from ..settings.values import ROTATION_NUMBERS
+from .half_turned import half_turned_wedge
 from .mirrored import wedge_of
 
 AT_IMAGE = 1e-6  #: farthest that a node is from the image of another, over the mean member
@@ -36,9 +37,13 @@ class Images:
         if not rows or isinstance(rows, str):
             return none
         if len(rows[0]) == ROTATION_NUMBERS:
-            point, axis = np.array(rows[0][:3]), np.array(rows[0][3:6])
-            rotation = Rotation(three_of(point), three_of(axis / np.linalg.norm(axis)), round(rows[0][6]), 0.0)
-            matrices, centre = [rotation.matrix(k) for k in range(rotation.order)], point - grid.origin
+            rotation, *beside = (Rotation.of_row(row) for row in rows)
+            if beside:
+                wedge = half_turned_wedge(rotation, beside[0], grid.origin)
+                matrices, centre = wedge.matrices(), wedge.centre
+            else:
+                matrices = [rotation.matrix(k) for k in range(rotation.order)]
+                centre = np.array(rotation.point) - grid.origin
         else:
             planes = [MirrorPlane(three_of(np.array(row[:3])), three_of(np.array(row[3:])), 0.0) for row in rows]
             wedge = wedge_of(planes, grid.origin)

@@ -1,11 +1,11 @@
-"""Grids that are exactly symmetric: the part between two mirror planes, cut off along rows on them, and its images."""
+"""Grids that are exactly symmetric: the part between two walls, mirror planes or lines of half turns, and its images."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -14,9 +14,7 @@ from ..grid.grid import Grid
 from ..grid.line_sets import FIXED_LINE, LineSet
 from ..grid.panels import triangles_of
 from ..scan.rotation import turn_about
-
-if TYPE_CHECKING:
-    from ..scan.symmetry import MirrorPlane
+from ..scan.symmetry import MirrorPlane
 
 ON_PLANE = 0.25  #: farthest node of a cut from its plane [member lengths]
 LEAST_PIECE = 0.5  #: shorter pieces of the line in which a plane meets the grid are left out [member lengths]
@@ -24,7 +22,7 @@ MIRROR_LINE = "mirror"  #: begins the names of the lines on mirror planes
 
 
 @dataclass(frozen=True, eq=False)
-class _Wedge:
+class Wedge:
     """The part of space that is kept: one side of a plane, or between two that meet in a line."""
 
     walls: list[tuple[np.ndarray, float]]  #: inner normals and offsets
@@ -32,13 +30,16 @@ class _Wedge:
     centre: np.ndarray  #: (3,) on the line
     axis: np.ndarray | None  #: (3,) along the line
     copies: int
+    half_turns: bool = False  #: about lines of the surface along each wall, instead of reflections
 
     def matrices(self) -> list[np.ndarray]:
-        """Return the (3, 3) of all images about `centre`, one after the other around the line: even ones turn, odd ones reflect."""
+        """Return the (3, 3) of all images about `centre`, one after the other around the line: odd ones reflect or turn over."""
         first = self.walls[0][0]
         mirror = np.eye(3) - 2.0 * np.outer(first, first)
         if self.axis is None:
             return [np.eye(3), mirror]
+        if self.half_turns:
+            mirror = mirror @ (np.eye(3) - 2.0 * np.outer(self.axis, self.axis))
         made = []
         for k in range(self.copies):
             angle = 2.0 * math.pi / self.copies * (k if k % 2 == 0 else k + 1)
@@ -47,12 +48,12 @@ class _Wedge:
         return made
 
 
-def wedge_of(planes: Sequence[MirrorPlane], origin: np.ndarray) -> _Wedge:
+def wedge_of(planes: Sequence[MirrorPlane], origin: np.ndarray, *, half_turns: bool = False) -> Wedge:
     """Return the part that is kept, relative to an origin: at the first plane, on the side of its normal."""
     normal = np.array(planes[0].normal)
     centre = np.array(planes[0].point) - origin
     if len(planes) == 1:
-        return _Wedge([(normal, float(normal @ centre))], [None], centre, None, 2)
+        return Wedge([(normal, float(normal @ centre))], [None], centre, None, 2)
     others = np.array([plane.normal for plane in planes[1:]])
     offsets = np.array([float(np.dot(plane.point - origin, plane.normal)) for plane in planes])
     axis = np.cross(normal, others[0])
@@ -64,7 +65,7 @@ def wedge_of(planes: Sequence[MirrorPlane], origin: np.ndarray) -> _Wedge:
     second = math.cos(angle) * first + math.sin(angle) * normal
     inner = math.sin(angle) * first - math.cos(angle) * normal
     walls = [(normal, float(normal @ centre)), (inner, float(inner @ centre))]
-    return _Wedge(walls, [first, second], centre, np.cross(first, normal), 2 * len(planes))
+    return Wedge(walls, [first, second], centre, np.cross(first, normal), 2 * len(planes), half_turns)
 
 
 def sides_of(planes: Sequence[MirrorPlane]) -> list[Sequence[MirrorPlane]]:
@@ -75,9 +76,8 @@ def sides_of(planes: Sequence[MirrorPlane]) -> list[Sequence[MirrorPlane]]:
     return [planes, [replace(planes[0], normal=(-x, -y, -z))]]
 
 
-def mirror_lines(grid: Grid, planes: Sequence[MirrorPlane], length: float) -> list[np.ndarray]:
+def mirror_lines(grid: Grid, wedge: Wedge, length: float) -> list[np.ndarray]:
     """Return the lines (K, 3) in which the walls of the part that is kept meet a grid, in the frame of the scan."""
-    wedge = wedge_of(planes, grid.origin)
     found: list[np.ndarray] = []
     for (normal, offset), ray in zip(wedge.walls, wedge.rays, strict=True):
         for line in section_of(grid, normal, offset):
@@ -96,15 +96,14 @@ def mirror_lines(grid: Grid, planes: Sequence[MirrorPlane], length: float) -> li
     return found
 
 
-def mirrored_grid(grid: Grid, planes: Sequence[MirrorPlane], length: float) -> Grid:
-    """Return the grid of the part that is kept and its images, of triangles or quads, which share the nodes on the planes.
+def mirrored_grid(grid: Grid, wedge: Wedge, length: float) -> Grid:
+    """Return the grid of the part that is kept and its images, of triangles or quads, which share the nodes on the walls.
 
     Raises
     ------
     FrontError
         The rows do not follow the planes: the part cannot be cut off along them.
     """
-    wedge = wedge_of(planes, grid.origin)
     middles = grid.nodes[grid.panel_table].mean(axis=1)
     inside = np.all([middles @ normal > offset for normal, offset in wedge.walls], axis=0)
     kept = grid.panel_table[inside]
@@ -116,10 +115,10 @@ def mirrored_grid(grid: Grid, planes: Sequence[MirrorPlane], length: float) -> G
     beyond = used[((depth < 1e-9 * length) & ~on[:, used]).any(axis=0)]
     flat = kept[on[:, kept].all(axis=2).any(axis=0)]
     if len(bad := np.concatenate([beyond, flat.ravel()])):
-        _refuse(grid, bad[0])
+        refuse_rows(grid, bad[0])
     at_wall = np.where(on[0], 0, np.where(on[-1], 1, -1)) if len(on) > 1 else np.where(on[0], 0, -1)
     on_axis = np.asarray(on.all(axis=0)) & (len(on) > 1)
-    return _united(grid, nodes, kept, at_wall, on_axis, wedge)
+    return united(grid, nodes, kept, at_wall, on_axis, wedge)
 
 
 def check_lines_kept(before: Grid, made: Grid, length: float, symmetry: str = "the mirror planes") -> None:
@@ -147,11 +146,32 @@ def check_lines_kept(before: Grid, made: Grid, length: float, symmetry: str = "t
                 )
 
 
-def _united(
-    grid: Grid, nodes: np.ndarray, kept: np.ndarray, at_wall: np.ndarray, on_axis: np.ndarray, wedge: _Wedge
+def united(
+    grid: Grid,
+    nodes: np.ndarray,
+    kept: np.ndarray,
+    at_wall: np.ndarray,
+    on_axis: np.ndarray,
+    wedge: Wedge,
+    beyond: np.ndarray | None = None,
 ) -> Grid:
-    """Return all images of the part as one grid; images of a node on a wall are one."""
-    used = np.unique(kept)
+    """Return all images of the part as one grid; images of a node on a wall are one.
+
+    Parameters
+    ----------
+    grid : Grid
+    nodes : (V, 3) float64
+    kept : (K, W)
+        Panels of the part.
+    at_wall : (V,)
+        Number of the wall that a node is on, -1 for none.
+    on_axis : (V,) bool
+    wedge : Wedge
+    beyond : (V,), optional
+        Of a node beyond the second wall that it is the image of, -1 of the others: panels with one lie across the wall.
+    """
+    beyond = np.full(len(nodes), -1) if beyond is None else beyond
+    used = np.unique(kept[beyond[kept] < 0])
     matrices = wedge.matrices()
     keys = np.empty((len(matrices), len(nodes)), np.int64)
     for k in range(len(matrices)):
@@ -169,8 +189,14 @@ def _united(
     places = nodes[source] - wedge.centre
     made = np.einsum("vij,vj->vi", np.array(matrices)[image_of], places) + wedge.centre
     made[image_of == 0] = nodes[source[image_of == 0]]
+    others = np.flatnonzero(beyond >= 0)
+    for k in range(len(matrices)):
+        across = matrices[k] @ matrices[1]  # the image beyond the second wall
+        there = int(np.argmin([np.abs(across - each).max() for each in matrices]))
+        number_of[k, others] = number_of[there, beyond[others]]
     back = [0, *range(kept.shape[1] - 1, 0, -1)]  # corners of a panel seen from the other side
-    panels = np.concatenate([number_of[k][kept if k % 2 == 0 else kept[:, back]] for k in range(len(matrices))])
+    inner = kept[(beyond[kept] < 0).all(axis=1)]  # what lies across a wall is in one of the two images
+    panels = np.concatenate([number_of[k][kept if k % 2 == 0 else inner[:, back]] for k in range(len(matrices))])
     return with_panels(
         grid,
         made,
@@ -230,15 +256,15 @@ def images_of_lines(lines: Sequence[LineSet], number_of: np.ndarray) -> tuple[Li
     return tuple(found)
 
 
-def _on_walls(grid: Grid, inside: np.ndarray, wedge: _Wedge, length: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the nodes, those of the cut brought onto the planes, and on which walls (W, V) they are."""
+def _on_walls(grid: Grid, inside: np.ndarray, wedge: Wedge, length: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the nodes, those of the cut brought onto the walls, and on which walls (W, V) they are."""
     uses = np.bincount(grid.panel_members[inside].ravel(), minlength=len(grid.edges))
     cut = np.unique(grid.edges[(uses == 1) & (grid.edge_uses == 2)])
     nodes = grid.nodes.copy()
     on = np.zeros((len(wedge.walls), len(nodes)), bool)
     off = np.abs([nodes[cut] @ normal - offset for normal, offset in wedge.walls])
     if len(cut) and (far := off.min(axis=0)).max() > ON_PLANE * length:
-        _refuse(grid, cut[int(far.argmax())])
+        refuse_rows(grid, cut[int(far.argmax())])
     if wedge.axis is not None and len(cut):
         from_axis = np.linalg.norm(_off_axis(nodes[cut], wedge), axis=1)
         at_axis = np.argmin(from_axis)
@@ -255,7 +281,7 @@ def _on_walls(grid: Grid, inside: np.ndarray, wedge: _Wedge, length: float) -> t
     return nodes, on
 
 
-def _off_axis(places: np.ndarray, wedge: _Wedge) -> np.ndarray:
+def _off_axis(places: np.ndarray, wedge: Wedge) -> np.ndarray:
     """Return what leads from the line of the planes to places."""
     assert wedge.axis is not None
     away = places - wedge.centre
@@ -317,9 +343,9 @@ def beyond_axis(line: np.ndarray, centre: np.ndarray, ray: np.ndarray) -> list[n
     return pieces
 
 
-def _refuse(grid: Grid, node: int) -> None:
-    """Refuse a grid of which the rows do not follow the planes."""
+def refuse_rows(grid: Grid, node: int, lines: str = "the mirror planes") -> None:
+    """Refuse a grid of which the rows do not follow the planes, or other lines."""
     where = ", ".join(f"{c:.5g}" for c in grid.scan_nodes[node])
     raise FrontError(
-        f"the rows do not follow the mirror planes at ({where}); try another --length, or leave --symmetry out", grid
+        f"the rows do not follow {lines} at ({where}); try another --length, or leave --symmetry out", grid
     )

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,11 +13,12 @@ import numpy as np
 from ..constraints.network import curves_of
 from ..errors import FrontError, InputError
 from ..kernels.boundary.curves import distances_from_curves
-from ..scan.rotation import Rotation, check_rotation, find_rotation
-from ..scan.symmetry import SYMMETRY_TOLERANCE, MirrorPlane, check_mirror_planes, find_mirror_planes
+from ..scan.rotation import Rotation, check_half_turn, check_rotation, find_half_turn, find_rotation, turn_about
+from ..scan.symmetry import SYMMETRY_TOLERANCE, MirrorPlane, check_mirror_planes, find_mirror_planes, three_of
 from ..settings.values import ROTATION_NUMBERS
+from .half_turned import half_turned_grid, half_turned_wedge, rows_of
 from .mirrored import MIRROR_LINE as EDGE_LINE
-from .mirrored import check_lines_kept, mirror_lines, mirrored_grid, sides_of
+from .mirrored import Wedge, check_lines_kept, mirror_lines, mirrored_grid, sides_of, wedge_of, without_edge_lines
 from .rotated import rotated_grid, seams_of
 
 if TYPE_CHECKING:
@@ -24,7 +26,7 @@ if TYPE_CHECKING:
     from ..grid.grid import Grid
     from ..settings import Settings
 
-__all__ = ["EDGE_LINE", "Symmetry", "check_boundary_kept", "find_symmetry"]
+__all__ = ["EDGE_LINE", "Symmetry", "check_boundary_kept", "find_symmetries"]
 
 ON_BOUNDARY = 0.4  # farthest that the boundary of the scan may lie from that of the images [member lengths]
 
@@ -87,10 +89,10 @@ class _Mirrored(Symmetry):
         return [plane.row for plane in self.planes]
 
     def edges(self, grid: Grid, length: float) -> list[list[np.ndarray]]:
-        return [mirror_lines(grid, self.planes, length)]
+        return [mirror_lines(grid, wedge_of(self.planes, grid.origin), length)]
 
     def made(self, grid: Grid, edges: list[np.ndarray], length: float, part: int) -> Grid:
-        made = mirrored_grid(grid, sides_of(self.planes)[part], length)
+        made = mirrored_grid(grid, wedge_of(sides_of(self.planes)[part], grid.origin), length)
         check_lines_kept(grid, made, length, "the mirror planes")
         return made
 
@@ -116,8 +118,33 @@ class _Rotated(Symmetry):
         return made
 
 
-def find_symmetry(points: np.ndarray, settings: Settings) -> Symmetry:
-    """Return the symmetry of a scan that the settings ask for.
+@dataclass(frozen=True, eq=False)
+class _HalfTurned(Symmetry):
+    rotation: Rotation
+    half_turn: Rotation
+
+    @property
+    def parts(self) -> int:
+        return 1
+
+    @property
+    def rows(self) -> list[tuple[float, ...]]:
+        return [self.rotation.row, self.half_turn.row]
+
+    def edges(self, grid: Grid, length: float) -> list[list[np.ndarray]]:
+        return [rows_of(grid, self._wedge(grid), length)]
+
+    def made(self, grid: Grid, edges: list[np.ndarray], length: float, part: int) -> Grid:
+        made = without_edge_lines(half_turned_grid(grid, self._wedge(grid), length))
+        check_lines_kept(grid, made, length, "the half turns")
+        return made
+
+    def _wedge(self, grid: Grid) -> Wedge:
+        return half_turned_wedge(self.rotation, self.half_turn, grid.origin)
+
+
+def find_symmetries(points: np.ndarray, settings: Settings) -> list[Symmetry]:
+    """Return the symmetry of a scan that the settings ask for, and after one with half turns that without.
 
     Parameters
     ----------
@@ -132,15 +159,31 @@ def find_symmetry(points: np.ndarray, settings: Settings) -> Symmetry:
     """
     asked, tolerance = settings.symmetry, SYMMETRY_TOLERANCE * settings.length
     if asked == "rotation":
-        return _Rotated(find_rotation(points, tolerance))
+        return _found_rotations(points, tolerance)
     if not isinstance(asked, str):
         if len(asked[0]) == ROTATION_NUMBERS:
-            return _Rotated(check_rotation(points, asked[0], tolerance))
-        return _Mirrored(check_mirror_planes(points, asked, tolerance))
+            rotation = check_rotation(points, asked[0], tolerance)
+            return [
+                _Rotated(rotation)
+                if len(asked) == 1
+                else _HalfTurned(rotation, check_half_turn(points, rotation, asked[1], tolerance))
+            ]
+        return [_Mirrored(check_mirror_planes(points, asked, tolerance))]
     try:
-        return _Mirrored(find_mirror_planes(points, tolerance))
+        return [_Mirrored(find_mirror_planes(points, tolerance))]
     except InputError as error:
         try:
-            return _Rotated(find_rotation(points, tolerance))
+            return _found_rotations(points, tolerance)
         except InputError:
             raise error from None
+
+
+def _found_rotations(points: np.ndarray, tolerance: float) -> list[Symmetry]:
+    """Return the rotation of a scan with the half turns about lines of its surface, where it has these, and without."""
+    rotation = find_rotation(points, tolerance)
+    half_turn = find_half_turn(points, rotation, tolerance)
+    plain = _Rotated(rotation)
+    if half_turn is None:
+        return [plain]
+    between = turn_about(np.array(rotation.axis), math.pi / rotation.order) @ half_turn.axis
+    return [_HalfTurned(rotation, each) for each in (half_turn, replace(half_turn, axis=three_of(between)))] + [plain]

@@ -17,7 +17,7 @@ from ..improve.images import Images
 from ..runtime.progress import Progress
 from .charts import Charts, shortened
 from .moved import moved_grid
-from .part_vectors import APART, PartVectors
+from .part_vectors import APART, PartVectors, is_mirrored, is_reversed
 
 REGULAR_ROUNDS = (12, 24)  #: in which all parts that may be alike are drawn to one kind, before each further descent
 ALIKE_ROUNDS = 400  #: of assignment and relaxation after that, and of the grid as it was
@@ -279,8 +279,9 @@ def _aims(
     """Return where the vectors (N, W, 3) of each part would be in the mean part of its kind, turned to it."""
     width = vectors.shape[1]
     at, count = np.arange(width), np.maximum(parts.count, 1)[:, None]
-    sign = np.where(shift >= count[:, 0], -1.0, 1.0)  # a mirror image by the point, which a turn makes any other
-    there = np.where(sign[:, None] < 0, shift[:, None] - at, shift[:, None] + at) % count
+    sign = np.where(is_mirrored(shift, parts.count), -1.0, 1.0)  # an image by the point, which a turn makes any other
+    back = is_reversed(shift, parts.count)[:, None]
+    there = np.where(back, shift[:, None] - at, shift[:, None] + at) % count
     there = np.where(at < count, there, at)  # of the part, for each vector of the kind
     rolled = sign[:, None, None] * np.take_along_axis(vectors, there[..., None], axis=1)
     mean = np.zeros((number, width, 3))
@@ -295,9 +296,9 @@ def _aims(
         np.add.at(total, near[within], np.einsum("vij,vwi->vwj", turns, rolled)[within])
         mean = parts.shaped(total / held)
     aim = np.einsum("vij,vwj->vwi", _turns(mean[near], rolled), mean[near])
-    back = np.where(sign[:, None] < 0, shift[:, None] - at, at - shift[:, None]) % count
-    back = np.where(at < count, back, at)
-    found = sign[:, None, None] * np.take_along_axis(aim, back[..., None], axis=1)
+    here = np.where(back, shift[:, None] - at, at - shift[:, None]) % count
+    here = np.where(at < count, here, at)
+    found = sign[:, None, None] * np.take_along_axis(aim, here[..., None], axis=1)
     none = first[near] < 0
     found[none] = vectors[none]
     return np.asarray(found)
@@ -366,7 +367,7 @@ def _sorted(parts: PartVectors, nodes: np.ndarray, kinds: np.ndarray, *, mirrore
     return Kinds(
         representative=kinds,
         of=np.where(used, near, -1),
-        mirrored=used & (shift[np.arange(len(near)), near] >= parts.count),
+        mirrored=used & is_mirrored(shift[np.arange(len(near)), near], parts.count),
         misfit=np.where(used, misfit.min(axis=1), 0.0),
     )
 

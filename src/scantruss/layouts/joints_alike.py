@@ -65,7 +65,7 @@ def few_joints(
 class Stars(PartVectors):
     """Joints as unit vectors along their members."""
 
-    called, size_is = "node", "members"
+    called, size_is, over = "node", "members", True
 
     least: np.ndarray  #: (V, W) least length of each member [unit of the grid]
     greatest: np.ndarray  #: (V, W) greatest length of each [unit of the grid]

@@ -54,7 +54,7 @@ def few_panels(
 class Corners(PartVectors):
     """Panels as vectors from their middles to their corners."""
 
-    called, size_is = "panel", "nodes"
+    called, size_is, over = "panel", "nodes", False
 
     mean: float  #: mean member [unit of the grid]
 

@@ -15,12 +15,25 @@ PAIRS_AT_ONCE = 1_000_000  #: parts that are compared before it is asked whether
 APART = 2.0  #: misfit of parts that cannot be alike
 
 
+def is_mirrored(shift: np.ndarray, count: np.ndarray) -> np.ndarray:
+    """Return whether shifts (N,) of parts of so many vectors (N,) stand for mirror images; see `turned_misfits`."""
+    way = shift // np.maximum(count, 1)
+    return np.asarray((way == 1) | (way == 3))
+
+
+def is_reversed(shift: np.ndarray, count: np.ndarray) -> np.ndarray:
+    """Return whether with shifts (N,) the vectors (N,) follow each other the other way round; see `turned_misfits`."""
+    way = shift // np.maximum(count, 1)
+    return np.asarray((way == 1) | (way == 2))
+
+
 @dataclass(frozen=True, eq=False)
 class PartVectors(ABC):
     """Joints or panels of a grid, each as vectors around a point, anticlockwise as seen from outside."""
 
     called: ClassVar[str]  #: what stands for one in a report
     size_is: ClassVar[str]  #: what its vectors go to
+    over: ClassVar[bool]  #: whether one that is turned over is alike, as it has no outside
 
     nodes_of: np.ndarray  #: (N, M) nodes that the vectors of each part depend on, -1 for none
     count: np.ndarray  #: (N,) int64, vectors of each part
@@ -71,7 +84,9 @@ class PartVectors(ABC):
         shape = len(both), len(parts)
         misfit, shift = np.empty(shape), np.empty(shape, np.int16)
         others = len(parts) + np.arange(len(parts))
-        turned_misfits(both, square, np.tile(count, 2), np.tile(self.is_open[parts], 2), others, False, misfit, shift)
+        turned_misfits(
+            both, square, np.tile(count, 2), np.tile(self.is_open[parts], 2), others, False, self.over, misfit, shift
+        )
         return misfit[: len(parts)]
 
     def misfits(
@@ -94,6 +109,6 @@ class PartVectors(ABC):
             some = others[first : first + step]
             block = len(self.count), len(some)
             of_block = np.empty(block), np.empty(block, np.int16)
-            turned_misfits(own, square, self.count, self.is_open, some, mirrored, *of_block)
+            turned_misfits(own, square, self.count, self.is_open, some, mirrored, self.over, *of_block)
             misfit[:, first : first + step], shift[:, first : first + step] = of_block
         return misfit, shift

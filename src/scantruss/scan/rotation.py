@@ -22,6 +22,10 @@ from .symmetry import (
 
 MOST_TURNS = 6  #: parts that a turn makes, at most: rows of members run along the edges of all six
 ROTATION_STEPS = 10  #: Gauss-Newton steps of an axis
+HALF_TURN_STEP = 2.0  #: between the axes of half turns that are tried [degree]
+LEAST_OF_LINE = 0.5  #: of the axis of a half turn that has points of the scan beside it
+LAST_DIGITS = 1e-9  #: rounding of axes and points that were found before, over their size
+MOST_OBLIQUE = 0.01  #: cosine of the angle between the axes of a rotation and a half turn, at most
 
 
 @dataclass(frozen=True)
@@ -37,6 +41,14 @@ class Rotation:
     def row(self) -> tuple[float, ...]:
         """Point, axis and order, as settings hold it."""
         return (*self.point, *self.axis, float(self.order))
+
+    @classmethod
+    def of_row(cls, row: Sequence[float]) -> Rotation:
+        """Return the rotation that a row of settings holds, its misfit not known."""
+        axis = np.array(row[3:6], float)
+        size = float(np.linalg.norm(axis))
+        axis = axis if abs(size - 1.0) < LAST_DIGITS else axis / size  # that of saved settings stays to the last digit
+        return cls(three_of(np.array(row[:3], float)), three_of(oriented(axis)), round(row[6]), 0.0)
 
     def matrix(self, times: int = 1) -> np.ndarray:
         """Return the (3, 3) that turns by so many parts."""
@@ -88,9 +100,7 @@ def find_rotation(points: np.ndarray, tolerance: float) -> Rotation:
 
 def check_rotation(points: np.ndarray, row: Sequence[float], tolerance: float) -> Rotation:
     """Return the rotation that the user gives, if the scan has it; see `find_rotation`."""
-    axis = np.array(row[3:6], float)
-    axis /= np.linalg.norm(axis)
-    given = Rotation(three_of(np.array(row[:3], float)), three_of(oriented(axis)), round(row[6]), 0.0)
+    given = Rotation.of_row(row)
     places = places_of(points)
     misfit = _misfit(places, given)
     if misfit > tolerance:
@@ -99,6 +109,79 @@ def check_rotation(points: np.ndarray, row: Sequence[float], tolerance: float) -
             f" {misfit:.4g} of its image, and {tolerance:.4g}, a tenth of a member, is needed"
         )
     return replace(given, misfit=misfit)
+
+
+def find_half_turn(points: np.ndarray, rotation: Rotation, tolerance: float) -> Rotation | None:
+    """Return the half turn about a straight line of the surface that meets the axis of a rotation squarely; None where there is none.
+
+    Parameters
+    ----------
+    points : (N, 3) float64 [scan unit]
+    rotation : Rotation
+        Of the scan.
+    tolerance : float
+        Within which 95 % of the scan must lie from the turned scan, and 95 % of the line from the surface [scan unit].
+    """
+    places = places_of(points)
+    axis = np.array(rotation.axis)
+    first = np.linalg.svd(axis[None])[2][1]
+    tried = []
+    for angle in np.arange(0.0, math.pi / rotation.order, math.radians(HALF_TURN_STEP)).tolist():
+        rough = Rotation(three_of(places.origin), three_of(oriented(turn_about(axis, angle) @ first)), 2, 0.0)
+        tried.append((_misfit(places, rough), angle, rough))
+    misfit, _, rough = min(tried, key=lambda each: each[:2])
+    if misfit > ROUGHLY * tolerance:
+        return None
+    exact = _squared(rotation, _refined(places, rough))
+    found = replace(exact, misfit=_misfit(places, exact))
+    return found if found.misfit <= tolerance and _lies_in_surface(places, found, tolerance) else None
+
+
+def check_half_turn(points: np.ndarray, rotation: Rotation, row: Sequence[float], tolerance: float) -> Rotation:
+    """Return the half turn that the user gives beside a rotation, if the scan has it; see `find_half_turn`."""
+    given = Rotation.of_row(row)
+    refusal = "the axis of the half turn must meet that of the rotation squarely"
+    if abs(float(np.dot(given.axis, rotation.axis))) > MOST_OBLIQUE:
+        raise InputError(refusal)
+    exact = _squared(rotation, given)
+    off = np.abs(np.subtract((*exact.point, *exact.axis), (*given.point, *given.axis)))
+    exact = given if off.max() < LAST_DIGITS * (1.0 + np.abs(given.point).max()) else exact
+    if np.linalg.norm(np.cross(np.subtract(exact.point, given.point), given.axis)) > tolerance:
+        raise InputError(refusal)
+    places = places_of(points)
+    misfit = _misfit(places, exact)
+    if misfit > tolerance or not _lies_in_surface(places, exact, tolerance):
+        raise InputError(
+            f"the scan is not the same when it is turned over about the axis of the half turn: 95 % of it lie within {misfit:.4g} of its"
+            f" image, and {tolerance:.4g}, a tenth of a member, is needed, or the axis is no line of the surface"
+        )
+    return replace(exact, misfit=misfit)
+
+
+def _squared(rotation: Rotation, near: Rotation) -> Rotation:
+    """Return the half turn nearest to another whose axis meets that of a rotation squarely."""
+    axis, way = np.array(rotation.axis), np.array(near.axis)
+    way -= (way @ axis) * axis
+    way /= np.linalg.norm(way)
+    height = float(np.subtract(near.point, rotation.point) @ axis)
+    return Rotation(three_of(np.array(rotation.point) + height * axis), three_of(oriented(way)), 2, 0.0)
+
+
+def _lies_in_surface(places: PlacesOfScan, half_turn: Rotation, tolerance: float) -> bool:
+    """Return whether the axis of a half turn is a line of the surface, but for holes of less than half of it."""
+    centre, way = np.array(half_turn.point) - places.origin, np.array(half_turn.axis)
+    along = (places.at - centre) @ way
+    beside = np.linalg.norm(places.at - centre - np.outer(along, way), axis=1) < NEAR_CELLS * places.cell
+    if not beside.any():
+        return False
+    steps = np.arange(along[beside].min(), along[beside].max(), places.cell)
+    on = centre + np.outer(steps, way)
+    apart, nearest = places.tree.query(on)
+    near = apart < NEAR_CELLS * places.cell
+    if near.mean() < LEAST_OF_LINE:
+        return False
+    off = np.abs(((on - places.at[nearest]) * places.normals[nearest]).sum(axis=1))[near]
+    return bool(np.quantile(off, IMAGE_QUANTILE) <= tolerance)
 
 
 def _turned(places: PlacesOfScan, rotation: Rotation) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -255,32 +255,39 @@ def _nearest(joints: Joints, item: int, others: np.ndarray) -> tuple[np.ndarray,
     return 2.0 * np.degrees(np.arcsin(np.minimum(chord / 2.0, 1.0))).max(axis=-1), hole
 
 
-def _around(joints: Joints, item: int, others: np.ndarray) -> np.ndarray:
-    """Return the misfit (C, v) of a node to C others, for each of its members put into their first hole, the others following [degree]."""
+def _around(joints: Joints, item: int, others: np.ndarray, *, over: bool = False) -> np.ndarray:
+    """Return the misfit (C, v) of a node to C others, for each of its members put into their first hole, the others following [degree].
+
+    over : whether it is turned over first, its members in the opposite order
+    """
     mine = joints.own[joints.start[item] : joints.start[item + 1]]
     count = len(mine)
+    mine = mine[::-1] * [1.0, -1.0, -1.0] if over else mine
     turned = mine[(np.arange(count)[:, None] + np.arange(count)) % count]  # (v, v, 3)
     theirs = joints.own[joints.start[others][:, None] + np.arange(count)][:, None]  # (C, 1, v, 3)
     flat, their_flat = turned[..., 0] + 1j * turned[..., 1], theirs[..., 0] + 1j * theirs[..., 1]
     turn = np.angle((np.conj(flat) * their_flat).sum(axis=-1))  # (C, v)
     across = np.abs(flat * np.exp(1j * turn)[..., None] - their_flat)
     chord = np.hypot(across, turned[..., 2] - theirs[..., 2])
-    bolts, place = joints.bolt[joints.start[item] + np.arange(count)], np.arange(count)
+    bolts, place = joints.bolt[joints.start[item] : joints.start[item + 1]], np.arange(count)
+    bolts = bolts[::-1] if over else bolts
     their_bolts = joints.bolt[joints.start[others][:, None] + place][:, None]  # (C, 1, v)
     chord[bolts[(place[:, None] + place) % count] != their_bolts] = 2.0  # another thread is another ball
     return 2.0 * np.degrees(np.arcsin(np.minimum(chord / 2.0, 1.0))).max(axis=-1)
 
 
-def holes_of_types(joints: Joints, types: Clusters) -> np.ndarray:
-    """Return for each member end (2 E,) the hole of the representative that it goes into, from 0."""
+def holes_of_types(joints: Joints, types: Clusters, *, over: bool = False) -> np.ndarray:
+    """Return for each member end (2 E,) the hole of the representative that it goes into, from 0; over: some balls may be turned over."""
     holes = np.empty(len(joints.node), np.int64)
     for item in np.flatnonzero(types.of >= 0).tolist():
         begin, end = joints.start[item], joints.start[item + 1]
-        one = types.representative[types.of[item]][None]
+        one, place = types.representative[types.of[item]][None], np.arange(end - begin)
         if not joints.one_layer:
             misfit, hole = _nearest(joints, item, one)
             holes[begin:end] = hole[0, int(np.argmin(misfit[0]))]
             continue
         misfit = _around(joints, item, one)
-        holes[begin:end] = (np.arange(end - begin) - int(np.argmin(misfit[0]))) % (end - begin)
+        if over and (turned := _around(joints, item, one, over=True)).min() < misfit.min():
+            misfit, place = turned, place[::-1]
+        holes[begin:end] = (place - int(np.argmin(misfit[0]))) % (end - begin)
     return holes

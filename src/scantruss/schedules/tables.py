@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..grid.alike import JOINTS
 from ..grid.groups import BOUNDARY, INNER, member_groups
 from ..grid.marks import numbered
 from ..grid.panels import diagonals_of, panel_of_triangles, planarity_of
@@ -143,7 +144,8 @@ def _nodes(parts: Parts, ring: np.ndarray, mass: np.ndarray | None) -> Schedule:
 
 def _drilling(parts: Parts) -> Schedule:
     """One row for each hole of each ball, in the frame of the ball."""
-    joints = parts.joints
+    joints, alike = parts.joints, parts.grid.alike
+    over = alike is not None and alike.parts == JOINTS
     bolts = [
         column("bolt", "", [bolt_mark(each) for each in joints.bolt.tolist()]),
         column("thread", "mm", np.where(joints.bolt > 0, joints.bolt * parts.settings.thread, np.nan)),
@@ -154,7 +156,7 @@ def _drilling(parts: Parts) -> Schedule:
             column("node", "", _of(parts.node_marks, joints.node)),
             column("hole", "", np.arange(len(joints.node)) - joints.start[joints.node] + 1),
             column("member", "", _of(parts.member_marks, joints.member)),
-            column("hole of type", "", holes_of_types(joints, parts.node_types) + 1),
+            column("hole of type", "", holes_of_types(joints, parts.node_types, over=over) + 1),
             column("azimuth", DEGREE, joints.azimuth),
             column("angle to normal", DEGREE, joints.tilt),
             *_xyz("ball", "", joints.own),

@@ -267,7 +267,7 @@ class ConstraintSettings(_Checked):
         "",
         "mirror planes or the rotation that the grid keeps exactly: auto finds planes in the scan, else a rotation; rotation finds that"
         " only; or rows of a point and a normal, x y z nx ny nz, several in one line at equal angles; or one row of a point, an axis"
-        " and the parts of a turn, x y z ax ay az n",
+        " and the parts of a turn, x y z ax ay az n, and perhaps a second one of a half turn about a straight line of the surface",
         unit="scan unit",
     )
     ridge_angle: float = _setting(

@@ -91,7 +91,8 @@ def _coordinates(given: Any, refusal: str, needs: str) -> tuple[tuple[float, ...
 def check_symmetry(given: Any) -> str | tuple[tuple[float, ...], ...]:
     """Return a symmetry as the settings hold it, or refuse it.
 
-    "" for none, "auto", "rotation", rows of a point and a normal for mirror planes, or one row of a point, an axis and the parts of a turn.
+    "" for none, "auto", "rotation", rows of a point and a normal for mirror planes, or one row of a point, an axis and the parts of a turn,
+    and perhaps a second of a half turn about a line of the surface.
     """
     if given is None or (isinstance(given, str) and given in ("", *SYMMETRIES_FOUND)):
         return given or ""
@@ -104,14 +105,15 @@ def check_symmetry(given: Any) -> str | tuple[tuple[float, ...], ...]:
         raise InputError(refusal) from None
     for row in rows:
         finite = all(map(math.isfinite, row)) and any(row[3:6])
-        if len(row) == ROTATION_NUMBERS and (
-            len(rows) > 1 or not finite or row[6] != round(row[6]) or not 2 <= row[6] <= MOST_PARTS
-        ):
-            raise InputError(
-                f"a rotation stands alone and needs a point, an axis and the parts of a turn, 2 to {MOST_PARTS}, got {row}"
-            )
+        if len(row) == ROTATION_NUMBERS and (not finite or row[6] != round(row[6]) or not 2 <= row[6] <= MOST_PARTS):
+            raise InputError(f"a rotation needs a point, an axis and the parts of a turn, 2 to {MOST_PARTS}, got {row}")
         if len(row) not in (6, ROTATION_NUMBERS) or not finite:
             raise InputError(f"a mirror plane needs a point and a normal, six finite numbers, got {row}")
+    turns = [row for row in rows if len(row) == ROTATION_NUMBERS]
+    if turns and (len(rows) > 2 or len(turns) < len(rows) or (len(rows) == 2 and turns[1][6] != 2)):
+        raise InputError(
+            f"a rotation stands alone or before a half turn, a row of which the last number is 2, got {len(rows)} rows"
+        )
     return rows or ""
 
 

@@ -25,6 +25,7 @@ PANEL_COLOR = (205, 216, 223)
 SELECTED_COLOR = (230, 97, 1)
 LINE_WIDTH, WIDE, FAINT = 3.0, 7.0, 1.0  #: of members, of what stands out, of what only shows where it was [pixel]
 TUBE_RADIUS, BALL_RADIUS = 0.05, 0.09  #: of members and nodes drawn as bodies [mean member length]
+ROD_RADIUS = 0.03  #: of members of layers, drawn so where they are too many for lines [mean member length]
 DRAWN_POINTS, FIRST_POINTS = 100_000, 20_000  #: of the scan; of its first picture
 MOST_DRAWN_LINES = 4000  #: members that are drawn as lines
 MOST_BEADS = 33_000  #: points by which so many members are drawn
@@ -32,7 +33,8 @@ BEADS, BEAD_SIZE = (
     (3, 12),
     0.45,
 )  #: points of such a member at least and at most, and how large they are [their distance]
-TUBE_SIDES = 8
+MOST_DRAWN_RODS = 20_000  #: members of layers that are drawn as rods; more are points
+TUBE_SIDES, ROD_SIDES = 8, 3
 BODY_GAMMA, PANEL_GAMMA = 2.2, 1.45  #: exponents of colours, see `lit`
 SKY_LIGHT = 0.3  #: share of the light that comes from the sky
 PLAIN_LIGHT = 2.0  #: on all sides of bodies, without a sky
@@ -164,20 +166,17 @@ class Scene:
         around = np.concatenate([places, places[:1]]) if closed else places
         self.lines(name, np.stack([around[:-1], around[1:]], axis=1), np.array(color, np.uint8), width)
 
-    def tubes(self, name: str, ends: np.ndarray, colors: np.ndarray, radius: float) -> None:
-        """Draw segments (M, 2, 3) as tubes."""
+    def tubes(self, name: str, ends: np.ndarray, colors: np.ndarray, radius: float, sides: int = TUBE_SIDES) -> None:
+        """Draw segments (M, 2, 3) as tubes of so many sides."""
         if not len(ends):
             self.remove(name)
             return
-        angles = 2 * np.pi * np.arange(TUBE_SIDES) / TUBE_SIDES
-        circle = np.stack([np.cos(angles), np.sin(angles), np.zeros(TUBE_SIDES)], axis=1)
-        k = np.arange(TUBE_SIDES)
-        after = (k + 1) % TUBE_SIDES
+        k = np.arange(sides)
+        angles = 2 * np.pi * k / sides
+        circle = np.stack([np.cos(angles), np.sin(angles), np.zeros(sides)], axis=1)
+        after = (k + 1) % sides
         faces = np.concatenate(
-            [
-                np.stack([k, after, k + TUBE_SIDES], axis=1),
-                np.stack([after, after + TUBE_SIDES, k + TUBE_SIDES], axis=1),
-            ]
+            [np.stack([k, after, k + sides], axis=1), np.stack([after, after + sides, k + sides], axis=1)]
         )
         spans = ends[:, 1] - ends[:, 0]
         sizes = np.linalg.norm(spans, axis=1)
@@ -269,6 +268,11 @@ class Scene:
 def is_layered(model: Model) -> bool:
     """Whether a structure has layers below its panels, which must be seen through them."""
     return model.truss is not None and model.truss.layers is not None
+
+
+def drawn_as_rods(model: Model, number: int) -> bool:
+    """Whether so many members of a model are drawn as rods: of layers, which points do not show, and too many for lines."""
+    return is_layered(model) and MOST_DRAWN_LINES < number <= MOST_DRAWN_RODS
 
 
 def lit(colors: np.ndarray, gamma: float) -> np.ndarray:

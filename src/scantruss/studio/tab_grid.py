@@ -20,8 +20,12 @@ from .scene import (
     GRID_PARTS,
     LINE_WIDTH,
     MOST_DRAWN_LINES,
+    ROD_RADIUS,
+    ROD_SIDES,
     TUBE_RADIUS,
+    TUBE_SIDES,
     cut,
+    drawn_as_rods,
     drawn_colors,
     is_layered,
     plain_colors,
@@ -180,12 +184,20 @@ class GridTab:
             self.count.content = "grey, while Compare draws another design over it"
         ends, of_members = cut(section, places[model.members], of_members)
         lines, bodies = self.members.value and not self.tubes.value, self.members.value and self.tubes.value
+        as_rods = lines and drawn_as_rods(model, len(ends))
+        lines = lines and not as_rods
         scene.members(
             "/grid/members", ends if lines else ends[:0], of_members if lines else of_members[:0],
             FAINT if is_faint else LINE_WIDTH,
         )  # fmt: skip
+        radius, sides = (ROD_RADIUS, ROD_SIDES) if as_rods else (TUBE_RADIUS, TUBE_SIDES)
+        in_space = bodies or as_rods
         scene.tubes(
-            "/grid/tubes", ends if bodies else ends[:0], of_members if bodies else of_members[:0], TUBE_RADIUS * size
+            "/grid/tubes",
+            ends if in_space else ends[:0],
+            of_members if in_space else of_members[:0],
+            radius * size,
+            sides,
         )
         kept = np.ones(len(places), bool) if section is None else section.keeps(places)
         drawn = (

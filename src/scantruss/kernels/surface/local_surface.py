@@ -270,6 +270,13 @@ def onto_patch(patch: np.ndarray, place: Vector) -> Vector:
 
 
 @kernel
+def feet_on_patches(patches: np.ndarray, places: np.ndarray, feet: np.ndarray) -> None:
+    """Fill the feet (N, 3) of places (N, 3), each on its own patch (N, columns)."""
+    for k in range(len(places)):
+        feet[k, 0], feet[k, 1], feet[k, 2] = onto_patch(patches[k], row(places, k))
+
+
+@kernel
 def patch_normal(patch: np.ndarray, place: Vector) -> Vector:
     """Unit normal of a patch over a place."""
     normal, u = vector_from(patch, NORMAL), vector_from(patch, TANGENT)
