@@ -216,7 +216,7 @@ def test_a_person_makes_a_grid_and_a_structure(served: tuple[str, Session], tmp_
         tab(page, "Design")
         page.click("text=Few different parts")
         field(page, "tolerance").fill("20%")
-        page.click("button:has-text('Find the trade')")
+        page.click("button:has-text('Find what fewer cost')")
         page.click("svg [data-low='5'] rect")
         page.wait_for_selector("text=undo: 5 lengths")
         assert session.worker.wait(60) and session.grid.alike is not None and session.grid.alike.count == 5
@@ -363,7 +363,7 @@ def test_a_server_that_is_killed_in_a_run_of_the_structure_keeps_grid_and_struct
         page.click("text=Sizing and modes")
         page.wait_for_timeout(500)
         field(page, "section").fill("CHS139.7x5")
-        field(page, "size").fill("6")
+        field(page, "most sections").fill("6")
         page.click("button:has-text('Run')")
         page.wait_for_selector("[role=status]:has-text('weight curve')", timeout=120_000)
         killable.kill()
@@ -376,8 +376,8 @@ def test_a_server_that_is_killed_in_a_run_of_the_structure_keeps_grid_and_struct
         tab(page, "Structure")
         assert page.inner_text("p:has-text('mass without nodes')") == figures
         page.click("text=Sizing and modes")
-        assert (field(page, "section").input_value(), field(page, "size").input_value()) == ("CHS139.7x5", "6")
-        field(page, "size").fill("0")
+        assert (field(page, "section").input_value(), field(page, "most sections").input_value()) == ("CHS139.7x5", "6")
+        field(page, "most sections").fill("0")
         page.click("button:has-text('Run')")
         page.wait_for_selector("text=undo: run", timeout=120_000)
         page.wait_for_selector("[role=status]:has-text('ready')")

@@ -48,7 +48,7 @@ def test_what_is_refused_or_old_is_told_from_what_is(tmp_path: Path) -> None:
         page.click("button:has-text('Run')")
         page.wait_for_selector("text=before the last change", state="detached")
         page.click("text=Sizing and modes")
-        say(page, "size", "2")
+        say(page, "most sections", "2")
         page.wait_for_selector("text=the section is chosen by sizing, at most 2")
         assert page.locator("text=Sizing and modes (sections chosen by sizing, at most 2)").count() == 1
         tab(page, "Design")

@@ -43,7 +43,7 @@ class CertificateList:
             warned = "".join(
                 f"\n\n**warning:** the grid {in_words_of_page(each.words)}" for each in certificate.warnings
             )
-            self.words.content = f"certificate: {certificate}{warned}"
+            self.words.content = f"certificate: {in_words_of_page(str(certificate))}{warned}"
         words = tuple(f"{k} {pin.words} {pin.value}".strip() for k, pin in enumerate(self._pins, 1))
         self.places.options = words or ("-",)
         self._draw()

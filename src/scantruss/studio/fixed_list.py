@@ -20,7 +20,11 @@ FIXED_COLOR = np.array((230, 97, 1), np.uint8)
 FIXED_RADIUS = 0.1  #: of a fixed node that is drawn [scene]
 NONE_CHOSEN = "-"
 FIX_MODE = "place fixed node"
-FIX_WAYS = ("Add", "Move", "Delete")
+FIX_WAYS = {
+    "Add": "a fixed node at x, y, z",
+    "Move": "the chosen node to x, y, z",
+    "Delete": "the chosen node",
+}
 
 
 class FixedNodes:
@@ -31,7 +35,7 @@ class FixedNodes:
         by_click = gui.add_button("Place by clicks", hint="then click on the scan; drag a ball to move it")
         self.chosen = gui.add_dropdown("node", (NONE_CHOSEN,))
         self.words = gui.add_text("x, y, z", "", hint="in the frame of the scan, in its unit")
-        ways = gui.add_button_group("typed", FIX_WAYS, hint="Add x, y, z, or move the chosen node there")
+        ways = view.rows.add("typed node", FIX_WAYS)
         self._balls = DraggedBalls(view, "/fixed", lambda number, place: self._set(tuple(place.tolist()), number))
         view.corrects(self.words)
         by_click.on_click(view.step(lambda: setattr(view.click, "value", FIX_MODE)))
@@ -40,10 +44,10 @@ class FixedNodes:
         ways.on_click(view.chosen(self._do))
 
     def _do(self, way: str) -> None:
-        if way == FIX_WAYS[2]:
+        if way == "Delete":
             self._delete()
         else:
-            self._set(self._typed(), len(self._fixed) if way == FIX_WAYS[0] else self._number())
+            self._set(self._typed(), len(self._fixed) if way == "Add" else self._number())
 
     @property
     def _fixed(self) -> tuple[tuple[float, ...], ...]:

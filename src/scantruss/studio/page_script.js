@@ -66,3 +66,12 @@ addEventListener("keydown", (event) => {
   event.preventDefault();
   give(part.dataset.field, part.dataset.low, part.dataset.high);
 });
+
+// The server is told which tabs are seen, in a text field that is not: what a click on the drawing does ends with its tab.
+let told = "";
+const tellTabs = () => {
+  const open = [...document.querySelectorAll("[role=tab][aria-selected=true]")].map((each) => each.textContent.trim()).join(",");
+  if (open !== told) give("open tabs", (told = open), open);
+};
+addEventListener("DOMContentLoaded", () =>
+  new MutationObserver(tellTabs).observe(document.body, { subtree: true, attributes: true, attributeFilter: ["aria-selected"] }));

@@ -167,6 +167,11 @@ class Session(TradeSteps):
         if not self.show_quick():  # which looks for them too
             self._look_for_features()
 
+    @property
+    def has_looked(self) -> bool:
+        """Whether holes and ridges of the present scan have been looked for."""
+        return self._features_of is not None and self._features_of[0] is self.cloud
+
     def _find_features(self, progress: Progress) -> None:
         cloud, settings = self.cloud, self.settings.replace(fill_at=(), no_ridge_at=(), effort="quick")
         if not self.wants_features or cloud is None:

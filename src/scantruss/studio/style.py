@@ -24,6 +24,7 @@ PANEL_STYLE = """<style>
 .mantine-Notification-closeButton { pointer-events: auto }
 :is(.mantine-Input-input, .mantine-Checkbox-input:not(:checked)) { border-color: #868e96 !important }
 [data-mantine-color-scheme="dark"] .mantine-Checkbox-input:checked { border-color: #8cc4f8 !important }
+div:has(> .studio-unseen), div:has(> .studio-unseen) + div { display: none }
 .studio-head { padding: .3em .8em 0; line-height: 1.35; font-size: .95em }
 .studio-head > [role="status"] { height: 2.7em; overflow-y: auto }
 :has(> div > div > div > .studio-head) { overflow: visible !important }
