@@ -2,12 +2,15 @@
 
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 import numpy as np
 from browser import open_page
-from studio_person import choose, field, served_dome, tab, until
+from studio_person import SMALL, choose, field, served_dome, tab, until
 
 from scantruss.grid.marks import node_marks
+from scantruss.studio.browsers import Browsers
+from scantruss.studio.server import serve_browsers, start_server
 
 
 def ready(page: Any, session: Any) -> None:
@@ -121,12 +124,26 @@ def test_undo_drops_the_last_corner_of_a_polygon_and_one_that_crosses_itself_is_
         assert errors == []
 
 
-def test_a_page_says_when_the_server_has_gone(tmp_path: Path) -> None:
+def test_a_page_says_when_the_server_has_gone_and_goes_on_when_it_is_back(tmp_path: Path) -> None:
     with served_dome(tmp_path) as (address, session, server), open_page(address) as (page, errors):
+        page.set_viewport_size(SMALL)
         ready(page, session)
-        page.wait_for_timeout(4000)  # it asks once
+        tab(page, "Design")
+        with page.expect_response("**/alive"):
+            pass
         assert page.locator("text=Connection lost").count() == 0
         server.stop()
         page.wait_for_selector("text=Connection lost", timeout=15_000)
-        page.screenshot(path=str(tmp_path / "lost.png"))
+        again, _ = start_server("127.0.0.1", int(urlsplit(address).port or 0))
+        try:
+            serve_browsers(again, Browsers(session))
+            page.wait_for_selector("text=Connection lost", state="detached", timeout=30_000)
+            page.wait_for_selector("text=dome.scantruss")
+            tab(page, "Design")
+            length = session.settings.length
+            page.focus("[role=slider]:visible")
+            page.keyboard.press("ArrowRight")
+            assert until(lambda: session.settings.length > length)
+        finally:
+            again.stop()
         assert errors == []
