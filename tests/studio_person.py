@@ -16,7 +16,6 @@ from scantruss.studio.browsers import Browsers
 from scantruss.studio.server import serve_browsers, start_server
 from scantruss.studio.session import Session
 
-
 SMALL = {"width": 700, "height": 420}  # of a window: drawn by software, the smaller the sooner [pixel]
 
 

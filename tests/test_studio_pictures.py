@@ -39,11 +39,12 @@ def test_a_turntable_tells_how_far_it_is_and_can_be_stopped(stops_at: int | None
         step=lambda step: step,
         aside=lambda step: step,
         say=lambda words: None,
+        legends=SimpleNamespace(shown=()),
         look=SimpleNamespace(tubes=SimpleNamespace(value=False), dark=SimpleNamespace(value=False)),
         scene=SimpleNamespace(api=SimpleNamespace(set_background_image=lambda image: None)),
         frame=SceneFrame.of(session.cloud),
         client=SimpleNamespace(
-            camera=SimpleNamespace(position=(8.0, -14.0, 9.0), look_at=(0.0, 0.0, 0.0), fov=0.65),
+            camera=SimpleNamespace(position=(8.0, -14.0, 9.0), look_at=(0.0, 0.0, 0.0), fov=0.65, image_height=720),
             get_render=get_render,
             send_file_download=lambda name, content, save_immediately: sent.append(content),
         ),

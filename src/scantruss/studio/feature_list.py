@@ -27,7 +27,9 @@ class FeatureList:
     def __init__(self, view: StudioView, gui: Any) -> None:
         self.view, self._gui = view, gui
         self.shown = gui.add_checkbox("find and draw them", False)
-        self.none = gui.add_markdown("none found: the scan has no hole that could be closed, and no ridge", visible=False)
+        self.none = gui.add_markdown(
+            "none found: the scan has no hole that could be closed, and no ridge", visible=False
+        )
         self._list = gui.add_folder(None)
         self._boxes: list[Any] = []
         self._drawn: tuple[list[Feature], frozenset[int]] = ([], frozenset())

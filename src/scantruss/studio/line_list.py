@@ -20,7 +20,11 @@ LINE_COLOR, CHOSEN_LINE_COLOR = (178, 24, 120), (230, 97, 1)
 DRAWN_LINE_WIDTH = 6.0  #: of a fixed line [pixel]
 SIGNIFICANT_OF_LINE = 9  #: digits of a coordinate of a line
 TYPED_WAYS = {"Add": "the points above, as another line", "Delete": "the line that is chosen above"}
-LINE_WAYS = {"Finish": "the line ends at its last point", "Close": "back to its first point", "Drop point": "the last one goes"}
+LINE_WAYS = {
+    "Finish": "the line ends at its last point",
+    "Close": "back to its first point",
+    "Drop point": "the last one goes",
+}
 
 
 class LineList:

@@ -34,6 +34,7 @@ class Design:
     asked: Settings | None = None  #: with which it was asked for
     unpainted: float = 1.0  #: see `StudioState`
     is_live: bool = False  #: whether it is a quick one
+    layered: StructureSettings | None = None  #: with which a structure of more layers was made of it, which are drawn
 
 
 @dataclass(frozen=True, eq=False)

@@ -113,6 +113,6 @@ class ScanTab:
         state = self.view.session.state
         if state.cloud is None or not self.draws.value:
             self.view.scene.remove_scan()
-            self.view.legends.show("scan", "")
+            self.view.legends.show("scan", None)
             return
         self.view.legends.show("scan", self.view.scene.scan(state, self.coloring.value, self.view.look.section))

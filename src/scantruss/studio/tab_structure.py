@@ -95,9 +95,7 @@ class StructureTab:
     def __init__(self, view: StudioView, gui: Any) -> None:
         self.view = view
         kept = view.session.state.structure_settings
-        hint = (
-            "corners, boundary, lowest:H, fixed, ends, line:NAME, loop:N, N001, joined by +; or Place by clicks"
-        )
+        hint = "corners, boundary, lowest:H, fixed, ends, line:NAME, loop:N, N001, joined by +; or Place by clicks"
         self.preview = gui.add_markdown(PREVIEW_WORDS, visible=False)
         self.words = {"supports": gui.add_text("supports", kept.supports, hint=hint)}
         by_click = gui.add_button(
@@ -118,13 +116,15 @@ class StructureTab:
         }
         self.numbers = {
             "scale": gui.add_text(
-                "scale", text_of_scale(kept.scale), hint="of the structure to the scan: 1:500 is a 500th of it, 500:1 as many times as large; or a number"
+                "scale", text_of_scale(kept.scale), hint="structure to scan: 1:500 is a 500th, 500:1 as many times as large; or a number"
             )
         }  # fmt: skip
         self.folder = gui.add_folder(SIZING, expand_by_default=False)
         with self.folder:
             self.numbers["size"] = gui.add_text(
-                "most sections", str(kept.size), hint="different sections that sizing chooses at most; 0: no sizing, the section above"
+                "most sections",
+                str(kept.size),
+                hint="different sections that sizing chooses at most; 0: no sizing, the section above",
             )
             self.words["size_by"] = gui.add_dropdown(
                 "each section for", WAYS_TO_GROUP, initial_value=kept.size_by, hint="what gets a section of its own"
@@ -323,11 +323,11 @@ class StructureTab:
         return moved, factor, is_mode
 
     def _draw(self, state: StudioState) -> None:
-        scene, shown, legend = self.view.scene, self.view.shown_model(), ""
+        scene, shown, legend = self.view.scene, self.view.shown_model(), None
         self._draw_supports(state)
         if shown is None or state.solution is None or shown[0].truss is None:
             scene.remove("/moved", "/loads")
-            self.view.legends.show("shape", "")
+            self.view.legends.show("shape", None)
             return
         model, _ = shown
         places = self.view.places(model)

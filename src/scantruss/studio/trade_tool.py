@@ -26,12 +26,16 @@ class TradeTool:
         self.view = view
         self.parts = gui.add_dropdown("fewer", WHAT_IS_ALIKE, hint="different lengths of members, joints or panels")
         self.tolerance = gui.add_text(
-            "tolerance", "1%", hint="parts within it of each other are made the same: largest misfit over the mean member; of joints that of unit directions"
+            "tolerance",
+            "1%",
+            hint="parts within it of each other are made the same: largest misfit over the mean member; of joints that of unit directions",
         )
         self.mirrored = gui.add_checkbox(
             "mirror images equal", False, visible=False, hint="as flat panels are that may be turned over"
         )
-        find = gui.add_button("Find what fewer cost", hint="takes a minute or some, joints and panels longest; Stop ends it")
+        find = gui.add_button(
+            "Find what fewer cost", hint="takes a minute or some, joints and panels longest; Stop ends it"
+        )
         self.curve = gui.add_html("")
         self.number = gui.add_text(NUMBER_FIELD, "", visible=False, hint="lengths or kinds; or click on the curve")
         self.about = gui.add_markdown("", visible=False)

@@ -50,7 +50,9 @@ STEPS = {
     "See all": "moves the camera back to where all is seen",
 }  #: and what each does
 TABS = ("Scan", "Design", "Constraints", "Grid", "Compare", "Structure", "Out")
-OPEN_TABS = "open tabs"  #: label of the field, never seen, in which the page says which tabs are open (`page_script.js`)
+OPEN_TABS = (
+    "open tabs"  #: label of the field, never seen, in which the page says which tabs are open (`page_script.js`)
+)
 SMALL_PICTURE, PICTURE_WAIT = (
     (8, 8),
     2.0,
@@ -254,10 +256,13 @@ class StudioView(Presses):
         asked = state.shown_structure
         return scale_of(state.settings.unit or (state.cloud.unit if state.cloud else "") or asked.unit, asked.scale)
 
+    def unit_of(self, model: Model) -> float:
+        """Return one scan unit in the unit of a model: a structure is in metres."""
+        return 1.0 if model.truss is None else self.metres()
+
     def places(self, model: Model) -> np.ndarray:
         """Return where the nodes of a model are drawn (V, 3)."""
-        nodes = model.nodes if model.truss is None else model.nodes / self.metres()
-        return self.frame.to_scene(nodes)
+        return self.frame.to_scene(model.nodes / self.unit_of(model))
 
     def fly(self, where: np.ndarray, reach: float) -> None:
         """Move the camera to a place of the scene, as far off as `reach`."""
@@ -284,6 +289,23 @@ class StudioView(Presses):
         corners = self.frame.corners
         aside = np.array([BESIDE_FIRST * DRAWN_EXTENT * (designs - 1), 0.0, 0.0])
         self.see(np.concatenate([corners, corners + aside]))
+
+    def _look_again(self, before: StudioState | None, state: StudioState) -> None:
+        """Look at another scan or crop as a whole; where only some points went or came, as it was looked at before."""
+        assert state.cloud is not None
+        if (
+            before is None
+            or before.cloud is None
+            or before.opened != state.opened
+            or before.settings.crop != state.settings.crop
+            or before.cloud.unit != state.cloud.unit
+        ):
+            self.overview()
+            return
+        known, now, camera = SceneFrame.of(before.cloud), SceneFrame.of(state.cloud), self.client.camera
+        seen = now.to_scene(known.from_scene(np.array([camera.position, camera.look_at])))
+        with self.client.atomic():
+            camera.position, camera.look_at = tuple(seen[0].tolist()), tuple(seen[1].tolist())
 
     def see_all(self) -> None:
         """Move the camera back to where all that is drawn is seen."""
@@ -314,4 +336,4 @@ class StudioView(Presses):
             for tab in self.tabs:
                 tab.fill(before, state)
             if state.cloud is not None and (before is None or before.cloud is not state.cloud):
-                self.overview()
+                self._look_again(before, state)
