@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import InputError, words_of_place
+from ..errors import InputError, words_of_number, words_of_place
 from .dragging import DraggedBalls
 from .drawn_lines import clicked_point, numbers_of
 from .frame import SceneFrame
@@ -32,7 +32,10 @@ class FixedNodes:
 
     def __init__(self, view: StudioView, gui: Any) -> None:
         self.view = view
-        by_click = gui.add_button("Place by clicks", hint="then click on the scan; drag a ball to move it")
+        by_click = gui.add_button(
+            "Place by clicks",
+            hint="then click on the scan, near a corner of its boundary for the corner; drag a ball to move it",
+        )
         self.chosen = gui.add_dropdown("node", (NONE_CHOSEN,))
         self.words = gui.add_text("x, y, z", "", hint="in the frame of the scan, in its unit")
         ways = view.rows.add("typed node", FIX_WAYS)
@@ -79,7 +82,18 @@ class FixedNodes:
         if len(places) and (there := nearest_point(places, origin, ahead)) is not None:
             self._show(there)
             return
-        self._set(tuple(clicked_point(self.view, origin, ahead).tolist()), len(self._fixed))
+        place = clicked_point(self.view, origin, ahead)
+        corner = self.view.session.corner_near(place)
+        if corner is not None:
+            if (known := next((k for k, one in enumerate(self._fixed) if np.allclose(one, corner)), None)) is not None:
+                self._show(known)
+                return
+            away = words_of_number(float(np.linalg.norm(corner - place)), 2)
+            self.view.say(
+                f"placed on the corner of the boundary, {away} off the click; drag the ball, or type, to have it elsewhere"
+            )
+            place = corner
+        self._set(tuple(float(f"{c:.12g}") for c in place.tolist()), len(self._fixed))
 
     def _choose(self) -> None:
         self._show(self._number() if self.chosen.value != NONE_CHOSEN else -1)

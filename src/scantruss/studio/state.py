@@ -76,6 +76,11 @@ class StudioState:
         tuple[float, ...], ...
     ] = ()  #: both ends of what was measured last, in the frame of the scan [scan unit]
 
+    @property
+    def is_of_file(self) -> bool:
+        """Whether options make of its file what is taken of the scan: none removes points by hand, or turns it."""
+        return self.removed is None and (self.whole is None or self.whole.up == "z")
+
     def taken(self) -> np.ndarray:
         """Return which points of the whole scan are taken (N,)."""
         assert self.whole is not None

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError
+from ..structure.build import scale_of
 from ..structure.groups import WAYS_TO_GROUP
 from ..structure.options import loads_of_words
 from ..structure.report_lines import sizing_lines
@@ -114,6 +115,7 @@ class StructureTab:
             "material": gui.add_text("material", kept.material),
             "loads": gui.add_text("loads", ",".join(map(str, kept.loads)), hint="self,snow:1kN/m2,wind:0.8kN/m2:-0.7"),
         }
+        self.metric = gui.add_markdown("", visible=False)
         self.numbers = {
             "scale": gui.add_text(
                 "scale", text_of_scale(kept.scale), hint="structure to scan: 1:500 is a 500th, 500:1 as many times as large; or a number"
@@ -214,7 +216,13 @@ class StructureTab:
     def _show_notes(self, state: StudioState) -> None:
         """Say what a person must know of the grid, the supports and the section before Run is pressed."""
         self.preview.visible = state.is_live
-        size = state.structure_settings.size
+        size, unit = state.structure_settings.size, state.grid.unit if state.grid is not None else ""
+        self.metric.visible = unit not in ("", "m")
+        if self.metric.visible:
+            metres = scale_of(unit, state.structure_settings.scale)
+            self.metric.content = (
+                f"lengths of the structure are in metres: 1 {unit} of the scan is {metres:.6g} m; loads also as 20psf"
+            )
         self._look_for_supports(state)
         self.lost.content, self.lost.visible = f"**supports:** {self._why_none}", bool(self._why_none)
         chosen = f"chosen by sizing, at most {size}" if size else ""

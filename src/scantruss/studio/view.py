@@ -299,6 +299,7 @@ class StudioView(Presses):
             or before.opened != state.opened
             or before.settings.crop != state.settings.crop
             or before.cloud.unit != state.cloud.unit
+            or (before.whole is not None and state.whole is not None and before.whole.up != state.whole.up)
         ):
             self.overview()
             return
