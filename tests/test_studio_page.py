@@ -25,6 +25,7 @@ from scantruss.studio.colours import colors_of
 from scantruss.studio.scan_steps import LARGEST_UPLOAD, TOO_LARGE
 from scantruss.studio.server import PAGE_SCRIPTS, Guard, address_to_open, start_server
 from scantruss.studio.session import Session
+from scantruss.studio.tab_out import words_of_suffix
 
 
 @pytest.fixture
@@ -153,7 +154,7 @@ def is_orange(pixels: np.ndarray) -> np.ndarray:
 
 def downloaded(page: Any, kind: str, old: str, suffix: str, folder: Path) -> Path:
     """Download a grid or a structure in a format."""
-    choose(page, old, suffix)
+    choose(page, words_of_suffix(old), words_of_suffix(suffix))
     with page.expect_download() as download:
         page.click(f"button:has-text('Download the {kind}')")
     download.value.save_as(folder / f"{kind}{suffix}")

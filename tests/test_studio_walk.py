@@ -1,11 +1,13 @@
 """What a person meets on a walk through the page of the studio: what stays in sight, what is kept as set, what is marked as old."""
 
+import io
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
 import numpy as np
 from browser import open_page
+from PIL import Image
 from studio_person import SMALL, choose, field, served_dome, tab, until
 
 from scantruss.grid.marks import node_marks
@@ -17,6 +19,13 @@ def ready(page: Any, session: Any) -> None:
     """Wait until nothing runs."""
     assert session.worker.wait(60)
     page.wait_for_selector("text=Generate")
+
+
+def greens(page: Any) -> int:
+    """Return how many pixels of the drawing have the colour of a support, in light or shade."""
+    picture = Image.open(io.BytesIO(page.screenshot(clip={"x": 0, "y": 160, "width": 800, "height": 430})))
+    red, green, blue = np.asarray(picture.convert("RGB")).reshape(-1, 3).astype(int).T
+    return int(((green > 60) & (red < 0.4 * green) & (blue < 0.6 * green)).sum())
 
 
 def say(page: Any, name: str, text: str) -> None:
@@ -31,8 +40,22 @@ def test_what_is_refused_or_old_is_told_from_what_is(tmp_path: Path) -> None:
         tab(page, "Out")
         page.wait_for_selector("text=this is the quick preview")
         assert "--effort quick" in page.inner_text("pre:visible")
+        undo = page.locator("button:has-text('Undo')").first
+        assert "takes back" in undo.get_attribute("title") and "ends what runs" not in undo.get_attribute("title")
+        tab(page, "Design")
+        page.click("text=Holes and ridges")
+        field(page, "find and draw them").check()
+        page.wait_for_selector("text=none found")
+        assert field(page, "click to").input_value() == "switch hole or ridge"
         tab(page, "Structure")
+        assert until(lambda: field(page, "click to").input_value() == "select"), "it ended with its tab"
         page.wait_for_selector("text=this is the quick preview")
+        assert until(lambda: greens(page) > 100), "supports are drawn before they are solved"
+        say(page, "supports", "cornets")
+        page.wait_for_selector("text=did you mean corners?")
+        assert until(lambda: greens(page) == 0)
+        say(page, "supports", "corners")
+        assert until(lambda: 0 < greens(page) < 1000)
         page.click("button:has-text('Generate')")
         page.wait_for_selector("text=this is the quick preview", state="hidden")
         assert not session.state.is_live
