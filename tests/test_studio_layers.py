@@ -20,7 +20,7 @@ from scantruss.studio.further_files import PRINTED, further_files
 from scantruss.studio.layers_tool import AS_USUAL, LayersTool, words_of_depths
 from scantruss.studio.outputs import settings_files
 from scantruss.studio.session import Session
-from scantruss.studio.support_places import for_new_scan
+from scantruss.studio.support_places import asked_supports, for_new_scan
 from scantruss.studio.tab_structure import StructureTab
 from scantruss.studio.view import StudioView
 
@@ -134,15 +134,15 @@ def test_a_click_on_a_layer_below_names_no_node_of_the_grid(tmp_path: Path) -> N
     grid, model = session.grid, session.model("structure")
     assert grid is not None
     many: Any = SimpleNamespace(node_marks=tuple(f"N{number:04d}" for number in range(1, len(model.nodes) + 1)))
-    said, drawn = list[Any](), list[Any]()
+    said = list[Any]()
     view = SimpleNamespace(shown_model=lambda: (many, {}), session=session, say=said.append)
     tab: Any = SimpleNamespace(
         view=view,
         words={"supports": SimpleNamespace(value="")},
-        _mark_supports=lambda nodes, name: drawn.append(nodes),
     )
     StructureTab.support(tab, ("nodes", 3))
-    assert session.state.structure_settings.supports == node_marks(grid)[3] == "N004" and drawn == [[3]]
+    assert session.state.structure_settings.supports == node_marks(grid)[3] == "N004"
+    assert asked_supports(session.state)[0].tolist() == [3], "which is drawn"
     with pytest.raises(st.InputError, match='"supports on" inner'):
         StructureTab.support(tab, ("nodes", len(grid.nodes)))
     assert session.state.structure_settings.supports == "N004"
