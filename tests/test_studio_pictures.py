@@ -11,7 +11,7 @@ from PIL import Image
 from studio_dome import done
 
 from scantruss.studio.frame import SceneFrame
-from scantruss.studio.legend import Legend, with_legends
+from scantruss.studio.legend import ColourLegend, with_legends
 from scantruss.studio.pictures import TURN_FRAMES, TURN_SIZE, PictureTool
 from scantruss.studio.session import Session
 
@@ -19,8 +19,8 @@ from scantruss.studio.session import Session
 def test_a_legend_stands_in_the_corner_of_a_picture_and_nowhere_else() -> None:
     picture = np.full((600, 900, 3), 7, np.uint8)
     stops = ((200, 0, 0), (0, 200, 0), (0, 0, 200))
-    legend = Legend("length", "m", (1.0, 3.0), stops).with_mark((90, 10, 170), "more than 3")
-    drawn = with_legends(picture, [legend, Legend("class", marks=(((1, 250, 3), "2 ground"),))], False)
+    legend = ColourLegend("length", "m", (1.0, 3.0), stops).with_mark((90, 10, 170), "more than 3")
+    drawn = with_legends(picture, [legend, ColourLegend("class", marks=(((1, 250, 3), "2 ground"),))], False)
     changed = np.argwhere((drawn != picture).any(axis=2))
     assert changed[:, 0].min() > 300 and changed[:, 1].max() < 300
     for color in (*stops, (90, 10, 170), (1, 250, 3)):

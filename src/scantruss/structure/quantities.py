@@ -7,14 +7,14 @@ import re
 
 from ..errors import InputError
 
-POUND, FOOT = 0.45359237 * 9.80665, 0.3048  #: force [N] and length [m], exact (NIST SP 811, appendix B)
+POUND_FORCE, FOOT_LENGTH = 0.45359237 * 9.80665, 0.3048  #: force [N] and length [m], exact (NIST SP 811, appendix B)
 METRIC_FORCE = {"N": 1.0, "kN": 1e3, "MN": 1e6}  #: [N]
-FORCE = {"lbf": POUND, "kip": 1e3 * POUND} | METRIC_FORCE  #: [N]
-LENGTH = {"in": FOOT / 12, "ft": FOOT, "mm": 1e-3, "cm": 1e-2, "m": 1.0}  #: [m]
+FORCE = {"lbf": POUND_FORCE, "kip": 1e3 * POUND_FORCE} | METRIC_FORCE  #: [N]
+LENGTH = {"in": FOOT_LENGTH / 12, "ft": FOOT_LENGTH, "mm": 1e-3, "cm": 1e-2, "m": 1.0}  #: [m]
 PRESSURE = {f"{name}/m2": value for name, value in METRIC_FORCE.items()} | {
-    "Pa": 1.0, "kPa": 1e3, "psf": POUND / FOOT**2, "ksf": 1e3 * POUND / FOOT**2,
+    "Pa": 1.0, "kPa": 1e3, "psf": POUND_FORCE / FOOT_LENGTH**2, "ksf": 1e3 * POUND_FORCE / FOOT_LENGTH**2,
 }  # fmt: skip  #: [N/m2]
-FORCE_PER_LENGTH = {"plf": POUND / FOOT, "klf": 1e3 * POUND / FOOT} | {
+FORCE_PER_LENGTH = {"plf": POUND_FORCE / FOOT_LENGTH, "klf": 1e3 * POUND_FORCE / FOOT_LENGTH} | {
     f"{name}/m": value for name, value in METRIC_FORCE.items()
 } | {"N/mm": 1e3, "kN/mm": 1e6}  # fmt: skip  #: [N/m]
 TEMPERATURE = {"C": 1.0, "K": 1.0}  #: of a change [K]

@@ -12,7 +12,7 @@ from ..check.distances import distances_to_grid
 from ..export.page_tables import PageColumn
 from ..surface.chosen_samples import KEPT
 from ..surface.samples import sample_surface
-from .legend import Legend
+from .legend import ColourLegend
 
 if TYPE_CHECKING:
     from .state import StudioState
@@ -78,18 +78,18 @@ def colors_of(
     return colors, low, high
 
 
-def legend_of(words: str, unit: str, low: float, high: float, diverging: bool) -> Legend:
+def legend_of(words: str, unit: str, low: float, high: float, diverging: bool) -> ColourLegend:
     """Return the legend of a colouring between two values."""
     stops = tuple((round(r), round(g), round(b)) for r, g, b in (DIVERGING if diverging else RISING).tolist())
-    return Legend(words, unit, (low, high), stops)
+    return ColourLegend(words, unit, (low, high), stops)
 
 
-def legend_of_names(words: str, names: Sequence[str], numbers: np.ndarray) -> Legend:
+def legend_of_names(words: str, names: Sequence[str], numbers: np.ndarray) -> ColourLegend:
     """Return the legend of what has one of some names, by their numbers from 1 (N,): a mark for each, with how many there are."""
     colors, _, _ = colors_of(1.0 + np.arange(len(names)), None)
     counts = np.bincount(numbers.astype(np.int64), minlength=len(names) + 1)[1:]
     rows = zip(names, colors.tolist(), counts.tolist(), strict=True)
-    return Legend(words, marks=tuple(((r, g, b), f"{name}, {count:,}") for name, (r, g, b), count in rows))
+    return ColourLegend(words, marks=tuple(((r, g, b), f"{name}, {count:,}") for name, (r, g, b), count in rows))
 
 
 def rgb_of(color: str) -> tuple[int, int, int]:
@@ -138,7 +138,7 @@ def colorings_of_scan(state: StudioState) -> tuple[str, ...]:
     return (*own, *((CLASSES,) if whole is not None and whole.classes is not None else ()), *SCAN_COLOURINGS)
 
 
-def colors_of_scan(state: StudioState, taken: np.ndarray, wanted: str) -> tuple[np.ndarray, Legend | None]:
+def colors_of_scan(state: StudioState, taken: np.ndarray, wanted: str) -> tuple[np.ndarray, ColourLegend | None]:
     """Return (K, 3) uint8 colours of some points of the scan of a state, and their legend, where there is one.
 
     Parameters
@@ -162,7 +162,7 @@ def colors_of_scan(state: StudioState, taken: np.ndarray, wanted: str) -> tuple[
     if wanted == OUTLIERS_IN_RED:
         kept = sample_surface(cloud, state.settings).judged[taken] == KEPT
         red, green, blue = OUTLIER_COLOR.tolist()
-        legend = Legend("scan", marks=(((red, green, blue), f"outliers, {int((~kept).sum()):,} of those drawn"),))
+        legend = ColourLegend("scan", marks=(((red, green, blue), f"outliers, {int((~kept).sum()):,} of those drawn"),))
         return np.where(kept[:, None], PLAIN, OUTLIER_COLOR), legend
     if wanted == FROM_GRID and grid is not None:
         places = np.ascontiguousarray(points + cloud.origin - grid.origin)
@@ -176,13 +176,13 @@ def colors_of_scan(state: StudioState, taken: np.ndarray, wanted: str) -> tuple[
     return colors, legend_of(wanted, cloud.unit, low, high, False)
 
 
-def legend_of_classes(numbers: list[int]) -> Legend:
+def legend_of_classes(numbers: list[int]) -> ColourLegend:
     """Return the legend of classes."""
     marks = (
         (CLASS_COLORS[k % len(CLASS_COLORS)].tolist(), f"{k} {CLASS_NAMES.get(k, '')}".strip())
         for k in numbers[:MOST_CLASSES]
     )
-    return Legend("class", marks=tuple(((r, g, b), words) for (r, g, b), words in marks))
+    return ColourLegend("class", marks=tuple(((r, g, b), words) for (r, g, b), words in marks))
 
 
 def _normals(points: np.ndarray) -> np.ndarray:

@@ -93,6 +93,11 @@ class CropTool:
         self.view.session.crop(parts)
         self._clear()
 
+    def put_away(self) -> None:
+        """Draw no box or polygon that has not been taken; its words stay in the field."""
+        if self._handles or self._corners:
+            self._clear()
+
     def _clear(self) -> None:
         """Draw nothing more of what was being chosen."""
         for handle in self._handles:

@@ -17,12 +17,12 @@ LINE_HIGH, SCALE_HIGH, MARK_WIDE = (
     0.9,
     1.0,
 )  #: of a line of a legend in a picture, its scale and a mark [height of a letter]
-BEHIND, WRITTEN = {False: (255, 255, 255), True: (30, 32, 36)}, {False: (0, 0, 0), True: (240, 240, 240)}
+LEGEND_BEHIND, LEGEND_LETTERS = {False: (255, 255, 255), True: (30, 32, 36)}, {False: (0, 0, 0), True: (240, 240, 240)}
 """Behind and of the letters of a legend in a picture of a light and a dark page."""
 
 
 @dataclass(frozen=True)
-class Legend:
+class ColourLegend:
     """What colours stand for: a scale between two values, marks of single colours, or both."""
 
     title: str
@@ -44,7 +44,7 @@ class Legend:
         low, high = self.ends
         return tuple(f"{value:.4g}" for value in (low, (low + high) / 2, high))
 
-    def with_mark(self, color: Rgb, words: str) -> Legend:
+    def with_mark(self, color: Rgb, words: str) -> ColourLegend:
         """Return the legend with another mark."""
         return replace(self, marks=(*self.marks, (color, words)))
 
@@ -66,7 +66,7 @@ class Legend:
         return f'<div style="padding:0 .6em;font-size:.85em">{escape(self.name)}{scale}{marks}</div>'
 
 
-def with_legends(pixels: np.ndarray, legends: Sequence[Legend], is_dark: bool) -> np.ndarray:
+def with_legends(pixels: np.ndarray, legends: Sequence[ColourLegend], is_dark: bool) -> np.ndarray:
     """Return a picture (H, W, 3) uint8 with legends in its lower left corner."""
     if not legends:
         return pixels
@@ -83,9 +83,9 @@ def with_legends(pixels: np.ndarray, legends: Sequence[Legend], is_dark: bool) -
     words += [2 * mark + draw.textlength(said, font) for each in legends for _, said in each.marks]
     wide = round(max(LEAST_WIDE * letter, *words))
     left, top = 2 * letter, len(pixels) - 2 * letter - lines * line
-    draw.rectangle((left - letter, top - letter, left + wide + letter, len(pixels) - letter), BEHIND[is_dark])
+    draw.rectangle((left - letter, top - letter, left + wide + letter, len(pixels) - letter), LEGEND_BEHIND[is_dark])
     for each in legends:
-        draw.text((left, top), each.name, WRITTEN[is_dark], font)
+        draw.text((left, top), each.name, LEGEND_LETTERS[is_dark], font)
         top += line
         if each.ends is not None:
             at = np.linspace(0, len(each.stops) - 1, wide)
@@ -96,10 +96,10 @@ def with_legends(pixels: np.ndarray, legends: Sequence[Legend], is_dark: bool) -
             top += line
             for share, said in zip((0.0, 0.5, 1.0), each.values, strict=True):
                 beside = share * (wide - draw.textlength(said, font))
-                draw.text((left + beside, top), said, WRITTEN[is_dark], font)
+                draw.text((left + beside, top), said, LEGEND_LETTERS[is_dark], font)
             top += line
         for color, said in each.marks:
             draw.rectangle((left, top, left + mark, top + mark), color)
-            draw.text((left + 2 * mark, top), said, WRITTEN[is_dark], font)
+            draw.text((left + 2 * mark, top), said, LEGEND_LETTERS[is_dark], font)
             top += line
     return np.asarray(picture)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from .legend import Legend
+from .legend import ColourLegend
 
 LEGEND_WIDTH = 260  #: [pixel]
 LEGEND_GAP = 12  #: from the lower left corner of the drawing [pixel]
@@ -18,14 +18,14 @@ class Legends:
         with self._panel.add_tab("Legend"):
             self._html = gui.add_html("")
         self._panel.float(x=LEGEND_GAP, y=-LEGEND_GAP, width=LEGEND_WIDTH)
-        self._shown: dict[str, Legend] = {}
+        self._shown: dict[str, ColourLegend] = {}
 
     @property
-    def shown(self) -> tuple[Legend, ...]:
+    def shown(self) -> tuple[ColourLegend, ...]:
         """Those that are seen."""
         return tuple(self._shown.values())
 
-    def show(self, name: str, legend: Legend | None) -> None:
+    def show(self, name: str, legend: ColourLegend | None) -> None:
         """Show the legend of a part of the drawing; None takes it away."""
         if self._shown.get(name) == legend:
             return

@@ -182,14 +182,21 @@ class ScanSteps(Steps):
         self.save()
 
     def set_unit(self, unit: str) -> None:
-        """Take the unit of the scan's coordinates; the grid of the scan without it is gone."""
-        self.stop()
+        """Take the unit of the scan's coordinates; the grid of the scan without it is gone.
+
+        Raises
+        ------
+        InputError
+            There is no scan, or it is still being read.
+        """
         cloud, whole = self.cloud, self.state.whole
+        if cloud is None:
+            raise InputError("there is no scan yet; open one")
+        self.stop()
         self._turn += 1
-        part = None if cloud is None else replace(cloud, unit=unit, system="")
+        part = replace(cloud, unit=unit, system="")
         if whole is not None:
-            same = part is not None and whole.cloud is cloud
-            whole = replace(whole, cloud=part if same and part else replace(whole.cloud, unit=unit, system=""))
+            whole = replace(whole, cloud=part if whole.cloud is cloud else replace(whole.cloud, unit=unit, system=""))
         self.change("unit", cloud=part, whole=whole, settings=self.settings.replace(unit=unit), **NO_GRID)
         self.save()
         self.show_quick()

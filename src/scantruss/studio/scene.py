@@ -13,7 +13,7 @@ from .tone import to_be_seen
 
 if TYPE_CHECKING:
     from ..export.model import Model
-    from .legend import Legend
+    from .legend import ColourLegend
     from .state import StudioState
 
 FRONT_COLOR = np.array((240, 190, 90), np.uint8)
@@ -61,11 +61,11 @@ class Scene:
         self._scan_key: tuple[Any, ...] = ()
         self._widths: dict[str, float] = {}  # of lines by their names, as on the page [pixel]
         self._front: tuple[np.ndarray, np.ndarray] | None = None
-        self._scan_legend: Legend | None = None
+        self._scan_legend: ColourLegend | None = None
 
     def scan(
         self, state: StudioState, wanted: str, section: SectionPlane | None, most: int = DRAWN_POINTS
-    ) -> Legend | None:
+    ) -> ColourLegend | None:
         """Draw the scan of a state, thinned, and return the legend of its colours, where there is one.
 
         Parameters

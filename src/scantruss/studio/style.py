@@ -30,7 +30,7 @@ div:has(> .studio-unseen), div:has(> .studio-unseen) + div { display: none }
 :has(> div > div > div > .studio-head) { overflow: visible !important }
 div:has(> .studio-head), div:has(> .studio-head) + div + div, div:has(> .studio-head) + div + div + div,
   div:has(> .studio-head) + div + div + div + div {
-  position: sticky !important; z-index: 3; background: var(--mantine-color-body); margin: 0 !important }
+  position: sticky !important; z-index: 20; background: var(--mantine-color-body); margin: 0 !important }
 div:has(> .studio-head) { top: 0; height: 60px }
 div:has(> .studio-head) + div + div { top: 60px; height: 16px }
 div:has(> .studio-head) + div + div + div { top: 76px; height: 36px; padding: 0 var(--mantine-spacing-xs) }

@@ -12,7 +12,7 @@ from .certificate_list import CertificateList
 from .colours import BRUSHED, DIMMED, colors_of, histogram_of, legend_of, legend_of_names, rgb_of, values_of
 from .drawn_lines import numbers_of
 from .frame import SectionPlane
-from .legend import Legend
+from .legend import ColourLegend
 from .pictures import PictureTool
 from .scale import round_ends, set_scale
 from .scene import (
@@ -152,7 +152,7 @@ class GridTab:
             return
         model, _ = shown
         places = self.view.places(model)
-        legend: Legend | None = None
+        legend: ColourLegend | None = None
         colors: dict[str, np.ndarray | None] = {"members": None, "nodes": None, "panels": None}
         if self._values is not None:
             choice = self._choices[self.coloring.value]

@@ -43,7 +43,7 @@ PLAN_FAR = 1.3  #: of the camera above a plan, so that all of it is seen [distan
 PANEL_WIDTH, USUAL_WIDTH = 452, 1280  #: of the panel; of a page that has not said its own [pixel]
 LEAST_DRAWING = 0.4  #: of a page that the drawing has beside the panel, which lies over it on narrower ones
 FIRST_SEEN_FROM = np.array([0.8, -1.4, 0.9])  #: direction from which the scan is seen first
-STEPS = {
+STEP_BUTTONS = {
     "Stop": "ends what runs; what was there before is kept",
     "Undo": "takes back what is said above (Ctrl+Z)",
     "Redo": "takes the step again that is said above (Ctrl+Y)",
@@ -90,7 +90,7 @@ class StudioView(Presses):
             self.head = Head(gui)
             generate = gui.add_button("Generate", color="blue", hint="with the effort that Design says (Ctrl+Enter)")
             self.rows = ButtonRows(gui)
-            self.steps = self.rows.add("steps", STEPS)
+            self.steps = self.rows.add("steps", STEP_BUTTONS)
             self.click = gui.add_dropdown(
                 "click to", (SELECT,), hint="what a click on the drawing does; select again once another tab is opened"
             )
@@ -142,7 +142,7 @@ class StudioView(Presses):
 
     def _step(self, name: str) -> None:
         session = self.session
-        dict(zip(STEPS, (session.stop, self.undo, session.redo, self.see_all), strict=True))[name]()
+        dict(zip(STEP_BUTTONS, (session.stop, self.undo, session.redo, self.see_all), strict=True))[name]()
 
     def undo(self) -> None:
         """Drop the last corner of what is being drawn, else take the last step back."""
@@ -166,11 +166,13 @@ class StudioView(Presses):
         return tab in self._seen_tabs
 
     def _open(self, words: str) -> None:
-        """Let a click select again, for what it did belongs to the tab that was left."""
+        """Let a click select again, for what it did, as a crop that is being drawn, belongs to the tab that was left."""
         seen = set(words.split(",")) & set(TABS)
         if seen != self._seen_tabs:
             self._seen_tabs = seen
             self.click.value = SELECT
+            if "Scan" not in seen:
+                self.scan.crop.put_away()
             self.structure.draw()
 
     # ---- clicks
