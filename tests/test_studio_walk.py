@@ -31,7 +31,7 @@ def greens(page: Any) -> int:
 def say(page: Any, name: str, text: str) -> None:
     """Type into a field, and wait for what it does."""
     field(page, name).fill(text)
-    page.wait_for_timeout(1000)
+    page.wait_for_timeout(750)
 
 
 def test_what_is_refused_or_old_is_told_from_what_is(tmp_path: Path) -> None:
