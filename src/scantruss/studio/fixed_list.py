@@ -88,7 +88,9 @@ class FixedNodes:
             if (known := next((k for k, one in enumerate(self._fixed) if np.allclose(one, corner)), None)) is not None:
                 self._show(known)
                 return
-            away = words_of_number(float(np.linalg.norm(corner - place)), 2)
+            cloud = self.view.session.cloud
+            unit = f" {cloud.unit}" if cloud is not None and cloud.unit else ""
+            away = words_of_number(float(np.linalg.norm(corner - place)), 2) + unit
             self.view.say(
                 f"placed on the corner of the boundary, {away} off the click; drag the ball, or type, to have it elsewhere"
             )
