@@ -18,8 +18,8 @@ from scantruss.studio.compare import structure_figures
 from scantruss.studio.further_files import FURTHER_FILES, PRINTED, PRINTED_BALL, SCHEDULES, further_files
 from scantruss.studio.outputs import settings_files
 from scantruss.studio.session import Session
+from scantruss.studio.structure_words import scale_of_text, text_of_scale, weight_bars
 from scantruss.studio.tab_out import PROGRAMS
-from scantruss.studio.tab_structure import scale_of_text, text_of_scale, weight_bars
 
 
 def check_further_files(session: Session, folder: Path) -> None:
