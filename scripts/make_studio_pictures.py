@@ -18,6 +18,7 @@ from scantruss.studio.opening import DATA_FOLDER, EXAMPLES, read_whole
 from scantruss.studio.scan_parts import WholeScan
 from scantruss.studio.server import serve_browsers, start_server
 from scantruss.studio.session import Session
+from scantruss.studio.tab_compare import NO_OTHER
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 FLAGS = "--no-sandbox --use-gl=angle --use-angle=swiftshader --enable-unsafe-swiftshader --ignore-gpu-blocklist".split()
@@ -25,6 +26,7 @@ PAGE_SIZE = {"width": 1280, "height": 720}
 FRAME_SIZE = (800, 450)  # of the GIF [pixel]
 GIF_COLORS, PNG_COLORS = 128, 256
 PATIENCE = 120.0  # [s]
+MOST_WAITS = 30  # for a drawing that changes
 
 
 class Walk:
@@ -48,6 +50,14 @@ class Walk:
         """Wait until nothing runs and the page has drawn it."""
         assert self.session.worker.wait(PATIENCE) and not self.session.message, self.session.message
         self.page.wait_for_timeout(milliseconds)
+
+    def settle(self) -> None:
+        """Wait until the drawing does not change any more, as when light comes up on a slow machine."""
+        before = b""
+        for _ in range(MOST_WAITS):
+            if before == (before := self.page.screenshot()):
+                return
+            self.page.wait_for_timeout(2000)
 
     def tab(self, name: str) -> None:
         """Go to a step."""
@@ -121,7 +131,7 @@ def walk(tour: Walk) -> None:
     page.wait_for_selector("text=undo: fixed node")
     tour.rest(1500)
     tour.see(1000)
-    tour.drag((330, 440), (420, 480))
+    tour.drag((330, 440), (420, 425))
     page.wait_for_timeout(500)
     tour.rest(1500)
     tour.see(1000)
@@ -141,7 +151,8 @@ def walk(tour: Walk) -> None:
     tour.choose("shape under", "as built")
     tour.tab("Grid")
     tour.field("as tubes and balls").click()
-    tour.rest(6000)
+    tour.rest(4000)
+    tour.settle()
     tour.see(1800, "daylight")
     tour.field("as tubes and balls").click()
     tour.tab("Compare")
@@ -163,7 +174,10 @@ def walk(tour: Walk) -> None:
 def walk_further(tour: Walk) -> None:
     """Make a grid of quads and a double layer, each for a picture of its own."""
     page = tour.page
+    tour.tab("Compare")
+    tour.choose("beside", NO_OTHER)
     tour.tab("Design")
+    page.click("text=Holes and ridges")
     tour.field("exactly").fill("1.4")
     page.wait_for_timeout(1000)
     tour.choose("cells", "quad")
@@ -174,6 +188,7 @@ def walk_further(tour: Walk) -> None:
     tour.choose("grid", "panels off their plane, over the mean diagonal")
     tour.tab("Design")
     tour.rest(2500)
+    tour.settle()
     tour.see(0, "quads")
     tour.choose("cells", "triangle")
     tour.field("exactly").fill("2.2")
@@ -189,7 +204,9 @@ def walk_further(tour: Walk) -> None:
     page.locator("xpath=//label[normalize-space(.)='loads']/following::input[1]").last.uncheck()
     page.mouse.move(1040, 500)
     page.mouse.wheel(0, -220)  # up to the fields again
+    page.mouse.move(500, 690)
     tour.rest(2500)
+    tour.settle()
     tour.see(0, "layers")
 
 
@@ -208,7 +225,7 @@ def main() -> None:
         serve_browsers(server, Browsers(session))
         browser = started.chromium.launch(executable_path=chromium, args=FLAGS)
         tour = Walk(browser.new_page(viewport=PAGE_SIZE), session)
-        tour.page.goto(f"http://127.0.0.1:{server.get_port()}/")
+        tour.page.goto(f"http://127.0.0.1:{server.get_port()}/?fixedDpr=1")  # however slow the machine is
         walk(tour)
         walk_further(Walk(tour.page, session))
         browser.close()

@@ -16,6 +16,8 @@ from scantruss.studio.browsers import Browsers
 from scantruss.studio.server import serve_browsers, start_server
 from scantruss.studio.session import Session
 
+SMALL = {"width": 700, "height": 420}  # of a window: drawn by software, the smaller the sooner [pixel]
+
 
 def free_port() -> int:
     """Return a port that nobody uses."""

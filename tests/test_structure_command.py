@@ -252,6 +252,8 @@ def test_what_is_odd_in_what_was_given_is_said(place: Path, capsys: pytest.Captu
     [
         ("nounit.json out.json", "the unit of the grid is not known, and a structure needs lengths in metres; give --unit"),
         ("grid.json out.json --unit m", "the grid is in mm, not in m"),
+        ("grid.json out.json --section HSS4.500x0.237", "American ones are not bundled; nearest in size is CHS114.3x6.3"),
+        ("grid.json out.json --section hss4x4x1/0", "American ones are not bundled; nearest in size is SHS"),
         ("grid.json out.json --section CHS114x5", "no section 'CHS114x5' is known; nearest are CHS114.3x5"),
         ("grid.json out.json --material S350", "no material 'S350' is known; nearest are S355"),
         ("grid.json out.json --supports fixed", "the grid has no fixed nodes; give scantruss grid --fixed X,Y,Z, or name others"),

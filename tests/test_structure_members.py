@@ -19,6 +19,7 @@ from scantruss.structure.checks import (
     strengths,
     utilizations,
 )
+from scantruss.structure.quantities import FORCE, FORCE_PER_LENGTH, LENGTH, PRESSURE, quantity
 from scantruss.structure.report import report_structure
 from scantruss.structure.statics import solve
 from scantruss.structure.truss import LoadCase, Truss
@@ -58,6 +59,16 @@ def test_every_bundled_row_names_its_source_and_is_sound() -> None:
         assert section.source and section.finish in ("hot", "cold")
         assert 0 < section.area < section.width * section.depth and section.elastic_y < section.plastic_y
     assert all(material.source for material in bundled_materials())
+
+
+@pytest.mark.parametrize(
+    ("text", "units", "metric"),
+    [("20psf", PRESSURE, 957.605), ("1ksf", PRESSURE, 47_880.26), ("1kip", FORCE, 4448.2216), ("12in", LENGTH, 0.3048),
+     ("2.5ft", LENGTH, 0.762), ("1klf", FORCE_PER_LENGTH, 14_593.9)],
+)  # fmt: skip
+def test_american_units_are_those_of_the_tables(text: str, units: dict[str, float], metric: float) -> None:
+    """NIST SP 811, appendix B.9."""
+    assert quantity(text, units, "load") == pytest.approx(metric, rel=1e-5)
 
 
 @pytest.mark.parametrize("name", ["chs114.3X5.0", " CHS 114.3 x 5", "CHS114.3x5"])

@@ -49,6 +49,17 @@ def test_a_line_between_two_points_follows_the_scan(dome: st.PointCloud) -> None
     SETTINGS.replace(fixed_lines=(line.tolist(),))
 
 
+def test_a_fixed_node_that_is_placed_near_a_corner_of_the_boundary_means_the_corner(tmp_path: Path) -> None:
+    session = session_of_dome(tmp_path, 6.0)
+    for x, y in ((0.0, 0.0), (10.0, 0.0), (10.0, 6.0), (0.0, 6.0)):
+        inwards = np.array([5.0 - x, 3.0 - y]) / 20.0
+        place = np.array([x + inwards[0], y + inwards[1], 1.0])
+        corner = session.corner_near(place)
+        assert corner is not None and np.linalg.norm(corner[:2] - [x, y]) < 0.1 * session.settings.length
+        session.fix((tuple(corner.tolist()),))  # a grid can have it
+    assert session.corner_near(np.array([5.0, 3.0, 2.0])) is None
+
+
 def test_typed_numbers_are_refused_in_words() -> None:
     assert points_of("1, 2 3; 4 5 6;") == [(1.0, 2.0, 3.0), (4.0, 5.0, 6.0)]
     for text in ("1 2", "1 2 3 4", "1 2 x"):

@@ -15,12 +15,12 @@ from scantruss.grid.marks import node_marks
 from scantruss.layouts.double_layer import BOTTOM, TOP, WEB
 from scantruss.layouts.framework import Framework
 from scantruss.structure.options import StructureSettings
-from scantruss.studio.compare import structure_figures
+from scantruss.studio.compare import drawn_members, structure_figures
 from scantruss.studio.further_files import PRINTED, further_files
 from scantruss.studio.layers_tool import AS_USUAL, LayersTool, words_of_depths
 from scantruss.studio.outputs import settings_files
 from scantruss.studio.session import Session
-from scantruss.studio.support_places import for_new_scan
+from scantruss.studio.support_places import asked_supports, for_new_scan
 from scantruss.studio.tab_structure import StructureTab
 from scantruss.studio.view import StudioView
 
@@ -47,6 +47,7 @@ def test_a_double_layer_is_that_of_the_command_line_and_kept(tmp_path: Path, mon
     ]
     monkeypatch.chdir(tmp_path)
     ours = session.files("structure", ".json")["structure.json"]
+    session.keep_design("A")
     for name, content in (settings_files(session.state) | session.files("grid", ".json")).items():
         Path(name).write_bytes(content)
     assert main(session.command().splitlines()[-1].split()[1:]) == 0
@@ -57,6 +58,10 @@ def test_a_double_layer_is_that_of_the_command_line_and_kept(tmp_path: Path, mon
     again.open(tmp_path / "dome.scantruss")
     assert again.state.structure_settings.double_layer == DEPTH and again.solution is not None
     assert again.files("structure", ".json")["structure.json"] == ours
+    for kept in (session.state.designs[0], again.state.designs[0]):  # drawn with all its layers
+        nodes, members = drawn_members(kept)
+        assert np.allclose(nodes, truss.nodes + truss.origin) and np.array_equal(members, truss.members)
+    session.undo()
     session.undo()
     taken_back = session.state
     assert taken_back.solution is None and taken_back.structure_settings.double_layer == DEPTH
@@ -129,15 +134,15 @@ def test_a_click_on_a_layer_below_names_no_node_of_the_grid(tmp_path: Path) -> N
     grid, model = session.grid, session.model("structure")
     assert grid is not None
     many: Any = SimpleNamespace(node_marks=tuple(f"N{number:04d}" for number in range(1, len(model.nodes) + 1)))
-    said, drawn = list[Any](), list[Any]()
+    said = list[Any]()
     view = SimpleNamespace(shown_model=lambda: (many, {}), session=session, say=said.append)
     tab: Any = SimpleNamespace(
         view=view,
         words={"supports": SimpleNamespace(value="")},
-        _mark_supports=lambda nodes, name: drawn.append(nodes),
     )
     StructureTab.support(tab, ("nodes", 3))
-    assert session.state.structure_settings.supports == node_marks(grid)[3] == "N004" and drawn == [[3]]
+    assert session.state.structure_settings.supports == node_marks(grid)[3] == "N004"
+    assert asked_supports(session.state)[0].tolist() == [3], "which is drawn"
     with pytest.raises(st.InputError, match='"supports on" inner'):
         StructureTab.support(tab, ("nodes", len(grid.nodes)))
     assert session.state.structure_settings.supports == "N004"

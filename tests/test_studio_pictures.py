@@ -11,8 +11,23 @@ from PIL import Image
 from studio_dome import done
 
 from scantruss.studio.frame import SceneFrame
+from scantruss.studio.legend import ColourLegend, with_legends
 from scantruss.studio.pictures import TURN_FRAMES, TURN_SIZE, PictureTool
 from scantruss.studio.session import Session
+
+
+def test_a_legend_stands_in_the_corner_of_a_picture_and_nowhere_else() -> None:
+    picture = np.full((600, 900, 3), 7, np.uint8)
+    stops = ((200, 0, 0), (0, 200, 0), (0, 0, 200))
+    legend = ColourLegend("length", "m", (1.0, 3.0), stops).with_mark((90, 10, 170), "more than 3")
+    drawn = with_legends(picture, [legend, ColourLegend("class", marks=(((1, 250, 3), "2 ground"),))], False)
+    changed = np.argwhere((drawn != picture).any(axis=2))
+    assert changed[:, 0].min() > 300 and changed[:, 1].max() < 300
+    for color in (*stops, (90, 10, 170), (1, 250, 3)):
+        assert (np.abs(drawn.astype(int) - color).max(axis=2) <= 2).sum() > 5, color
+    assert np.array_equal(with_legends(picture, [], False), picture)
+    said = legend.html()
+    assert "length [m]" in said and all(f">{value}<" in said for value in ("1", "2", "3"))
 
 
 @pytest.mark.parametrize("stops_at", [None, 3])
@@ -39,11 +54,12 @@ def test_a_turntable_tells_how_far_it_is_and_can_be_stopped(stops_at: int | None
         step=lambda step: step,
         aside=lambda step: step,
         say=lambda words: None,
+        legends=SimpleNamespace(shown=()),
         look=SimpleNamespace(tubes=SimpleNamespace(value=False), dark=SimpleNamespace(value=False)),
         scene=SimpleNamespace(api=SimpleNamespace(set_background_image=lambda image: None)),
         frame=SceneFrame.of(session.cloud),
         client=SimpleNamespace(
-            camera=SimpleNamespace(position=(8.0, -14.0, 9.0), look_at=(0.0, 0.0, 0.0), fov=0.65),
+            camera=SimpleNamespace(position=(8.0, -14.0, 9.0), look_at=(0.0, 0.0, 0.0), fov=0.65, image_height=720),
             get_render=get_render,
             send_file_download=lambda name, content, save_immediately: sent.append(content),
         ),

@@ -87,7 +87,7 @@ def test_a_scan_has_its_own_colours(suffix: str, tmp_path: Path) -> None:
     session = opened(written_in_color(tmp_path, suffix))
     assert colorings_of_scan(session.state)[0] == OWN_COLORS
     found, legend = colors_of_scan(session.state, np.arange(len(P)), OWN_COLORS)
-    assert np.array_equal(found, COLORS) and legend == ""
+    assert np.array_equal(found, COLORS) and legend is None
     session.crop(("box:2,1,7,6",))
     kept = (X >= 2) & (X <= 7) & (Y >= 1) & (Y <= 6)
     assert session.cloud is not None and len(session.cloud.points) == kept.sum()
@@ -104,7 +104,8 @@ def test_a_scan_without_colours_has_none(tmp_path: Path) -> None:
 def test_classes_are_coloured_and_named(tmp_path: Path) -> None:
     session = opened(written_in_color(tmp_path, ".las"))
     colors, legend = colors_of_scan(session.state, np.arange(len(P)), CLASSES)
-    assert len(np.unique(colors, axis=0)) == 2 and "1 unclassified" in legend
+    assert len(np.unique(colors, axis=0)) == 2 and legend is not None
+    assert [words for _, words in legend.marks if words == "1 unclassified"] and "1 unclassified" in legend.html()
     assert len(np.unique(colors[X > 4.01], axis=0)) == 1
 
 

@@ -168,7 +168,7 @@ def test_a_number_of_the_curve_counts_while_the_trade_goes_on(tmp_path: Path, mo
         page.click("text=Few different parts")
         page.wait_for_timeout(600)
         field(page, "tolerance").fill("20%")
-        page.click("button:has-text('Find the trade')")
+        page.click("button:has-text('Find what fewer cost')")
         number = COUNTS[1]
         page.wait_for_selector(f"svg [data-low='{number}'] rect", state="attached")
         page.click(f"svg [data-low='{number}'] rect", timeout=5000)

@@ -1,6 +1,9 @@
 """What the studio takes of a scan: the same points as the command line does."""
 
+import contextlib
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,8 +13,12 @@ from scantruss.cli.main import main
 from scantruss.scan.formats.reading import read_points
 from scantruss.selection import Selection, polygon_text
 from scantruss.studio.crop_tool import check_rings, crosses_itself
-from scantruss.studio.outputs import command_of
+from scantruss.studio.frame import SceneFrame
+from scantruss.studio.outputs import TAKEN, command_of, settings_files
+from scantruss.studio.scan_parts import UP_AXES
 from scantruss.studio.session import Session
+from scantruss.studio.state import StudioState
+from scantruss.studio.view import StudioView
 
 PATIENCE = 120.0
 
@@ -134,3 +141,51 @@ def test_a_polygon_that_crosses_itself_is_told_from_others(corners: list[tuple[f
             check_rings(polygon_text([corners]))
     else:
         check_rings(polygon_text([corners]))
+
+
+def test_a_scan_is_turned_to_stand_on_any_axis_of_its_file_and_back(las: Path, tmp_path: Path) -> None:
+    session = opened(las, tmp_path / "roof.scantruss")
+    assert session.cloud is not None
+    before = session.cloud.points + session.cloud.origin
+    session.fix((tuple(before[1000].tolist()),))
+    session.measure((tuple(before[0].tolist()), tuple(before[1].tolist())))
+    for up, axes in UP_AXES.items():
+        session.turn(up)
+        after = session.cloud.points + session.cloud.origin
+        height = before[:, "xyz".index(up[-1])] * (-1.0 if "-" in up else 1.0)
+        assert np.abs(after[:, 2] - height).max() < 1e-6, "that axis points up"
+        assert np.abs(after - before @ np.array(axes, float).T).max() < 1e-6
+        assert np.linalg.det(np.array(axes, float)) == 1.0, "no mirror image"
+    assert session.settings.fixed == () and session.state.tape == () and session.grid is None
+    assert command_of(session.state).startswith(f"scantruss grid {TAKEN} ")
+    (tmp_path / TAKEN).write_bytes(settings_files(session.state)[TAKEN])
+    read = read_points(tmp_path / TAKEN)
+    assert np.abs(read.points + read.origin - (session.cloud.points + session.cloud.origin)).max() < 1e-6
+    again = Session()
+    again.open(tmp_path / "roof.scantruss")
+    assert again.state.whole is not None and again.state.whole.up == "-x"
+    session.turn("z")
+    assert np.abs(session.cloud.points + session.cloud.origin - before).max() < 1e-6
+    assert TAKEN not in command_of(session.state)
+
+
+def test_the_camera_stays_where_points_go_and_sees_all_of_another_crop(las: Path, tmp_path: Path) -> None:
+    session = opened(las, tmp_path / "roof.scantruss")
+    camera, seen = SimpleNamespace(position=(8.0, -14.0, 9.0), look_at=(1.0, 2.0, 0.5)), list[str]()
+    client = SimpleNamespace(camera=camera, atomic=contextlib.nullcontext)
+    view: Any = SimpleNamespace(client=client, overview=lambda: seen.append("all"))
+
+    def places(state: StudioState) -> np.ndarray:
+        assert state.cloud is not None
+        return SceneFrame.of(state.cloud).from_scene(np.array([camera.position, camera.look_at]))
+
+    first = session.state
+    assert first.cloud is not None
+    before = places(first)
+    session.remove_points(first.cloud.points[:, 0] > np.median(first.cloud.points[:, 0]))  # half of it
+    StudioView._look_again(view, first, session.state)
+    assert seen == [] and np.abs(places(session.state) - before).max() < 1e-5
+    second = session.state
+    session.crop(("box:450001,5300001,450008,5300008",))
+    StudioView._look_again(view, second, session.state)
+    assert seen == ["all"]

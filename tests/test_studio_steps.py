@@ -9,6 +9,7 @@ import pytest
 
 import scantruss as st
 from scantruss.studio.browsers import MOST_BROWSERS, Browsers
+from scantruss.studio.certificate_list import merged
 from scantruss.studio.compare import comparison, deviation
 from scantruss.studio.features import HOLES, RIDGES, find_features, switched_off
 from scantruss.studio.frame import SceneFrame, SectionPlane
@@ -197,6 +198,13 @@ def test_what_a_ray_hits_is_what_a_slow_look_finds() -> None:
         at = nodes[number] / np.linalg.norm(nodes[number])
         assert pick(nodes, members[:0], panels[:0], eye, at) is not None
     assert pick(nodes, members[:0], panels[:0], eye, np.array([0.0, 0.0, -1.0])) is None
+
+
+def test_pins_that_would_lie_on_each_other_are_one_with_all_their_numbers() -> None:
+    places = np.array([[0, 0, 0], [5, 0, 0], [0.1, 0, 0], [0, 0.1, 0], [0, 0, 0.1], [5, 0.2, 0], [9, 9, 9]], float)
+    found = merged(places)
+    assert [words for words, _ in found] == ["1, 3, 4 +1", "2, 6", "7"]
+    assert np.allclose(found[0][1], places[[0, 2, 3, 4]].mean(axis=0)) and np.allclose(found[2][1], places[6])
 
 
 def test_what_panels_hide_is_not_picked() -> None:

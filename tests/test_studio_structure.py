@@ -12,13 +12,14 @@ from studio_dome import done, session_of_dome
 
 import scantruss as st
 from scantruss.cli.main import main
-from scantruss.export.formats import model_of
+from scantruss.export.formats import model_of, suffixes_of
 from scantruss.export.page_tables import colorings_of, tables_of
 from scantruss.studio.compare import structure_figures
 from scantruss.studio.further_files import FURTHER_FILES, PRINTED, PRINTED_BALL, SCHEDULES, further_files
 from scantruss.studio.outputs import settings_files
 from scantruss.studio.session import Session
-from scantruss.studio.tab_structure import scale_of_text, weight_bars
+from scantruss.studio.structure_words import scale_of_text, text_of_scale, weight_bars
+from scantruss.studio.tab_out import PROGRAMS
 
 
 def check_further_files(session: Session, folder: Path) -> None:
@@ -88,7 +89,9 @@ def test_the_page_says_whether_buckling_was_looked_at(tmp_path: Path) -> None:
 
 
 def test_scales_and_weights_are_words_of_the_page() -> None:
-    assert scale_of_text("1:100") == 0.01 and scale_of_text("2") == 2.0
+    assert scale_of_text("1:100") == 0.01 and scale_of_text("2") == 2.0 and set(PROGRAMS) == set(suffixes_of())
+    for text in ("1:1", "1:500", "1:33", "200:1", "0.7", "2.5"):
+        assert text_of_scale(scale_of_text(text)) == text
     for text in ("", "1:0", "x"):
         with pytest.raises(ValueError):
             scale_of_text(text)

@@ -66,7 +66,7 @@ def test_a_trade_needs_a_finished_grid_and_goes_with_it(tmp_path: Path) -> None:
     with pytest.raises(st.InputError, match="press Generate"):
         Session().find_trade("lengths", 0.01)
     session = session_of_dome(tmp_path, 10.0)
-    with pytest.raises(st.InputError, match="press Find the trade"):
+    with pytest.raises(st.InputError, match="press Find what fewer cost"):
         session.take_traded(5)
     session.find_trade("lengths", 0.2)
     done(session)
@@ -74,7 +74,7 @@ def test_a_trade_needs_a_finished_grid_and_goes_with_it(tmp_path: Path) -> None:
     done(session)
     assert session.grid is not None and session.grid.alike is not None and session.grid.alike.count == 3
     session.state = replace(session.state, trade=None)  # as in a project of before
-    with pytest.raises(st.InputError, match="lengths of this grid have been made alike"):
+    with pytest.raises(st.InputError, match="lengths of this grid have been made equal"):
         session.find_trade("joints", 0.01)
     session.generate()
     done(session)

@@ -1,13 +1,18 @@
 """What a person meets on a walk through the page of the studio: what stays in sight, what is kept as set, what is marked as old."""
 
+import io
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 import numpy as np
 from browser import open_page
-from studio_person import choose, field, served_dome, tab, until
+from PIL import Image
+from studio_person import SMALL, choose, field, served_dome, tab, until
 
 from scantruss.grid.marks import node_marks
+from scantruss.studio.browsers import Browsers
+from scantruss.studio.server import serve_browsers, start_server
 
 
 def ready(page: Any, session: Any) -> None:
@@ -16,10 +21,17 @@ def ready(page: Any, session: Any) -> None:
     page.wait_for_selector("text=Generate")
 
 
+def greens(page: Any) -> int:
+    """Return how many pixels of the drawing have the colour of a support, in light or shade."""
+    picture = Image.open(io.BytesIO(page.screenshot(clip={"x": 0, "y": 160, "width": 800, "height": 430})))
+    red, green, blue = np.asarray(picture.convert("RGB")).reshape(-1, 3).astype(int).T
+    return int(((green > 60) & (red < 0.4 * green) & (blue < 0.6 * green)).sum())
+
+
 def say(page: Any, name: str, text: str) -> None:
     """Type into a field, and wait for what it does."""
     field(page, name).fill(text)
-    page.wait_for_timeout(1000)
+    page.wait_for_timeout(750)
 
 
 def test_what_is_refused_or_old_is_told_from_what_is(tmp_path: Path) -> None:
@@ -28,8 +40,22 @@ def test_what_is_refused_or_old_is_told_from_what_is(tmp_path: Path) -> None:
         tab(page, "Out")
         page.wait_for_selector("text=this is the quick preview")
         assert "--effort quick" in page.inner_text("pre:visible")
+        undo = page.locator("button:has-text('Undo')").first
+        assert "takes back" in undo.get_attribute("title") and "ends what runs" not in undo.get_attribute("title")
+        tab(page, "Design")
+        page.click("text=Holes and ridges")
+        field(page, "find and draw them").check()
+        page.wait_for_selector("text=none found")
+        assert field(page, "click to").input_value() == "switch hole or ridge"
         tab(page, "Structure")
+        assert until(lambda: field(page, "click to").input_value() == "select"), "it ended with its tab"
         page.wait_for_selector("text=this is the quick preview")
+        assert until(lambda: greens(page) > 100), "supports are drawn before they are solved"
+        say(page, "supports", "cornets")
+        page.wait_for_selector("text=did you mean corners?")
+        assert until(lambda: greens(page) == 0)
+        say(page, "supports", "corners")
+        assert until(lambda: 0 < greens(page) < 1000)
         page.click("button:has-text('Generate')")
         page.wait_for_selector("text=this is the quick preview", state="hidden")
         assert not session.state.is_live
@@ -48,7 +74,7 @@ def test_what_is_refused_or_old_is_told_from_what_is(tmp_path: Path) -> None:
         page.click("button:has-text('Run')")
         page.wait_for_selector("text=before the last change", state="detached")
         page.click("text=Sizing and modes")
-        say(page, "size", "2")
+        say(page, "most sections", "2")
         page.wait_for_selector("text=the section is chosen by sizing, at most 2")
         assert page.locator("text=Sizing and modes (sections chosen by sizing, at most 2)").count() == 1
         tab(page, "Design")
@@ -121,12 +147,26 @@ def test_undo_drops_the_last_corner_of_a_polygon_and_one_that_crosses_itself_is_
         assert errors == []
 
 
-def test_a_page_says_when_the_server_has_gone(tmp_path: Path) -> None:
+def test_a_page_says_when_the_server_has_gone_and_goes_on_when_it_is_back(tmp_path: Path) -> None:
     with served_dome(tmp_path) as (address, session, server), open_page(address) as (page, errors):
+        page.set_viewport_size(SMALL)
         ready(page, session)
-        page.wait_for_timeout(4000)  # it asks once
+        tab(page, "Design")
+        with page.expect_response("**/alive"):
+            pass
         assert page.locator("text=Connection lost").count() == 0
         server.stop()
         page.wait_for_selector("text=Connection lost", timeout=15_000)
-        page.screenshot(path=str(tmp_path / "lost.png"))
+        again, _ = start_server("127.0.0.1", int(urlsplit(address).port or 0))
+        try:
+            serve_browsers(again, Browsers(session))
+            page.wait_for_selector("text=Connection lost", state="detached", timeout=30_000)
+            page.wait_for_selector("text=dome.scantruss")
+            tab(page, "Design")
+            length = session.settings.length
+            page.focus("[role=slider]:visible")
+            page.keyboard.press("ArrowRight")
+            assert until(lambda: session.settings.length > length)
+        finally:
+            again.stop()
         assert errors == []

@@ -193,10 +193,11 @@ def pins_of(certificate: Certificate) -> list[Pin]:
     """Return the places of faults, warnings, the worst figures and what is left out."""
     unit = f" {certificate.unit}" if certificate.unit else ""
     pins = [
-        Pin(f"{kind}: the grid {fault.words}", "", fault.where)
+        Pin(f"{kind}: the grid {fault.words}", f"place {number}" if fault.also else "", where)
         for kind, faults in (("fault", certificate.faults), ("warning", certificate.warnings))
         for fault in faults
-        if fault.where is not None
+        for number, where in enumerate((fault.where, *fault.also), 1)
+        if where is not None
     ]
     pins += [
         Pin(name, f"{words_of_number(worst.value, 4)}{' degrees' if of_angle else unit}", worst.where)

@@ -15,6 +15,9 @@ from typing import TypeVar
 from ..errors import FormatError, InputError
 
 CATALOGUES = Path(__file__).parent / "data"
+#: names of hollow sections of AISC in inches: HSS4.5x0.237 is circular, HSS4x4x1/4 square
+AMERICAN = re.compile(r"HSS(\d*\.?\d+)X(?:(\d*\.?\d+)X)?(\d*\.?\d+)(?:/(\d+))?", re.IGNORECASE)
+INCH = 0.0254  #: [m]
 SHAPES = ("CHS", "SHS", "R", "I")  #: circular and square hollow sections, solid rectangles, rolled I sections
 
 
@@ -148,6 +151,10 @@ def find_section(name: str) -> Section:
         width, depth = float(found[1]) / 1e3, float(found[2]) / 1e3
         if min(width, depth) > 0:
             return rectangle(f"R{found[1]}x{found[2]}", width, depth, "dimensions given")
+    if american := AMERICAN.fullmatch(name.strip()):
+        raise InputError(
+            f"no section {name!r} is known: American ones are not bundled; nearest in size is {_nearest_to(american).name}"
+        )
     if re.fullmatch(r"\d+\.?\d*x\d+\.?\d*", _key(name)):  # a tube, as `schedule` takes it
         name = f"CHS{name}"
     return _find(name, "section", bundled_sections, read_sections)
@@ -229,6 +236,14 @@ def _named(name: str, what: str, known: tuple[Named, ...]) -> Named:
     near = [word for word in sorted(by_key, key=lambda word: _distance(key, word)) if _distance(key, word) < math.inf]
     near = near or get_close_matches(key, by_key, 3, 0.4) or list(by_key)
     raise InputError(f"no {what} {name!r} is known; nearest are {' '.join(by_key[word].name for word in near[:3])}")
+
+
+def _nearest_to(american: re.Match[str]) -> Section:
+    """Return the bundled hollow section of a shape and a size next to those of an American one."""
+    wide, square = float(american[1]) * INCH, american[2] is not None
+    thick = float(american[3]) * INCH / max(float(american[4] or 1), 1.0)
+    known = [each for each in bundled_sections() if each.shape == ("SHS" if square else "CHS")]
+    return min(known, key=lambda one: abs(one.width - wide) / one.width + abs(one.thickness - thick) / one.thickness)
 
 
 def _distance(one: str, other: str) -> float:

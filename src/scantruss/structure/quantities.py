@@ -1,4 +1,4 @@
-"""Numbers with units as people write them: 0.5kN/m2, 20K, 12mm."""
+"""Numbers with units as people write them: 0.5kN/m2, 20psf, 20K, 12mm."""
 
 from __future__ import annotations
 
@@ -7,10 +7,16 @@ import re
 
 from ..errors import InputError
 
-FORCE = {"N": 1.0, "kN": 1e3, "MN": 1e6}  #: [N]
-LENGTH = {"mm": 1e-3, "cm": 1e-2, "m": 1.0}  #: [m]
-PRESSURE = {f"{name}/m2": value for name, value in FORCE.items()} | {"Pa": 1.0, "kPa": 1e3}  #: [N/m2]
-FORCE_PER_LENGTH = {f"{name}/m": value for name, value in FORCE.items()} | {"N/mm": 1e3, "kN/mm": 1e6}  #: [N/m]
+POUND_FORCE, FOOT_LENGTH = 0.45359237 * 9.80665, 0.3048  #: force [N] and length [m], exact (NIST SP 811, appendix B)
+METRIC_FORCE = {"N": 1.0, "kN": 1e3, "MN": 1e6}  #: [N]
+FORCE = {"lbf": POUND_FORCE, "kip": 1e3 * POUND_FORCE} | METRIC_FORCE  #: [N]
+LENGTH = {"in": FOOT_LENGTH / 12, "ft": FOOT_LENGTH, "mm": 1e-3, "cm": 1e-2, "m": 1.0}  #: [m]
+PRESSURE = {f"{name}/m2": value for name, value in METRIC_FORCE.items()} | {
+    "Pa": 1.0, "kPa": 1e3, "psf": POUND_FORCE / FOOT_LENGTH**2, "ksf": 1e3 * POUND_FORCE / FOOT_LENGTH**2,
+}  # fmt: skip  #: [N/m2]
+FORCE_PER_LENGTH = {"plf": POUND_FORCE / FOOT_LENGTH, "klf": 1e3 * POUND_FORCE / FOOT_LENGTH} | {
+    f"{name}/m": value for name, value in METRIC_FORCE.items()
+} | {"N/mm": 1e3, "kN/mm": 1e6}  # fmt: skip  #: [N/m]
 TEMPERATURE = {"C": 1.0, "K": 1.0}  #: of a change [K]
 
 

@@ -28,7 +28,9 @@ class CleanTool:
         self.pieces = gui.add_text(
             "loose pieces", "0.005", hint="detached pieces below this share of all points; 0: none"
         )
-        buttons = gui.add_button_group("red", ("Show what goes", "Keep all"), hint="duplicates go too")
+        buttons = view.rows.add(
+            "red", {"Show what goes": "in red, duplicates too; nothing goes yet", "Keep all": "nothing is red any more"}
+        )
         self.about = gui.add_markdown("")
         view.corrects(self.distance, self.pieces)
         remove = gui.add_button("Remove what is red")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from html import escape
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,6 +12,7 @@ from ..check.distances import distances_to_grid
 from ..export.page_tables import PageColumn
 from ..surface.chosen_samples import KEPT
 from ..surface.samples import sample_surface
+from .legend import ColourLegend
 
 if TYPE_CHECKING:
     from .state import StudioState
@@ -77,29 +78,24 @@ def colors_of(
     return colors, low, high
 
 
-def legend_of(words: str, unit: str, low: float, high: float, diverging: bool) -> str:
-    """Return the legend of a colouring as HTML."""
-    stops = ",".join(f"rgb({r:.0f},{g:.0f},{b:.0f})" for r, g, b in (DIVERGING if diverging else RISING))
-    ends = "".join(f"<span>{value:.4g}</span>" for value in (low, (low + high) / 2, high))
-    name = escape(f"{words} [{unit}]" if unit else words)
-    return (
-        f'<div style="padding:0 .6em;font-size:.85em">{name}<div style="height:.8em;background:linear-gradient(to right,{stops})"></div>'
-        f'<div style="display:flex;justify-content:space-between">{ends}</div></div>'
-    )
+def legend_of(words: str, unit: str, low: float, high: float, diverging: bool) -> ColourLegend:
+    """Return the legend of a colouring between two values."""
+    stops = tuple((round(r), round(g), round(b)) for r, g, b in (DIVERGING if diverging else RISING).tolist())
+    return ColourLegend(words, unit, (low, high), stops)
+
+
+def legend_of_names(words: str, names: Sequence[str], numbers: np.ndarray) -> ColourLegend:
+    """Return the legend of what has one of some names, by their numbers from 1 (N,): a mark for each, with how many there are."""
+    colors, _, _ = colors_of(1.0 + np.arange(len(names)), None)
+    counts = np.bincount(numbers.astype(np.int64), minlength=len(names) + 1)[1:]
+    rows = zip(names, colors.tolist(), counts.tolist(), strict=True)
+    return ColourLegend(words, marks=tuple(((r, g, b), f"{name}, {count:,}") for name, (r, g, b), count in rows))
 
 
 def rgb_of(color: str) -> tuple[int, int, int]:
     """Return the parts of a colour such as #d81e2c, from 0 to 255."""
     red, green, blue = bytes.fromhex(color.removeprefix("#"))
     return red, green, blue
-
-
-def legend_of_more(most: float, color: str) -> str:
-    """Return the legend of values beyond the scale as HTML."""
-    return (
-        '<div style="display:flex;gap:.5em;align-items:center;padding:0 .6em;font-size:.85em">'
-        f'<span style="width:.9em;height:.9em;background:{color}"></span>more than {most:g}</div>'
-    )
 
 
 def histogram_of(
@@ -142,8 +138,8 @@ def colorings_of_scan(state: StudioState) -> tuple[str, ...]:
     return (*own, *((CLASSES,) if whole is not None and whole.classes is not None else ()), *SCAN_COLOURINGS)
 
 
-def colors_of_scan(state: StudioState, taken: np.ndarray, wanted: str) -> tuple[np.ndarray, str]:
-    """Return (K, 3) uint8 colours of some points of the scan of a state, and their legend as HTML, where there is one.
+def colors_of_scan(state: StudioState, taken: np.ndarray, wanted: str) -> tuple[np.ndarray, ColourLegend | None]:
+    """Return (K, 3) uint8 colours of some points of the scan of a state, and their legend, where there is one.
 
     Parameters
     ----------
@@ -156,16 +152,18 @@ def colors_of_scan(state: StudioState, taken: np.ndarray, wanted: str) -> tuple[
     if wanted in (OWN_COLORS, CLASSES) and whole is not None:
         of_whole = np.flatnonzero(state.taken())[taken]
         if wanted == OWN_COLORS and whole.colors is not None:
-            return whole.colors[of_whole], ""
+            return whole.colors[of_whole], None
         if wanted == CLASSES and whole.classes is not None:
             numbers = whole.classes[of_whole].astype(np.int64)
             return CLASS_COLORS[numbers % len(CLASS_COLORS)], legend_of_classes(np.unique(numbers).tolist())
     if wanted == "normals":
         normals = cloud.normals[taken] if cloud.normals is not None else _normals(points)
-        return (127.5 * (normals + 1.0)).astype(np.uint8), ""
+        return (127.5 * (normals + 1.0)).astype(np.uint8), None
     if wanted == OUTLIERS_IN_RED:
         kept = sample_surface(cloud, state.settings).judged[taken] == KEPT
-        return np.where(kept[:, None], PLAIN, OUTLIER_COLOR), ""
+        red, green, blue = OUTLIER_COLOR.tolist()
+        legend = ColourLegend("scan", marks=(((red, green, blue), f"outliers, {int((~kept).sum()):,} of those drawn"),))
+        return np.where(kept[:, None], PLAIN, OUTLIER_COLOR), legend
     if wanted == FROM_GRID and grid is not None:
         places = np.ascontiguousarray(points + cloud.origin - grid.origin)
         values, _ = distances_to_grid(places, grid, float(grid.lengths.mean()))
@@ -173,20 +171,18 @@ def colors_of_scan(state: StudioState, taken: np.ndarray, wanted: str) -> tuple[
     elif wanted == "height":
         values = points[:, 2] + cloud.origin[2]
     else:
-        return np.broadcast_to(PLAIN, points.shape), ""
+        return np.broadcast_to(PLAIN, points.shape), None
     colors, low, high = colors_of(values, None)
     return colors, legend_of(wanted, cloud.unit, low, high, False)
 
 
-def legend_of_classes(numbers: list[int]) -> str:
-    """Return the legend of classes as HTML."""
-    rows = "".join(
-        '<div style="display:flex;gap:.5em;align-items:center"><span style="width:.9em;height:.9em;'
-        f'background:rgb({",".join(map(str, CLASS_COLORS[number % len(CLASS_COLORS)].tolist()))})"></span>'
-        f"{number} {CLASS_NAMES.get(number, '')}</div>"
-        for number in numbers[:MOST_CLASSES]
+def legend_of_classes(numbers: list[int]) -> ColourLegend:
+    """Return the legend of classes."""
+    marks = (
+        (CLASS_COLORS[k % len(CLASS_COLORS)].tolist(), f"{k} {CLASS_NAMES.get(k, '')}".strip())
+        for k in numbers[:MOST_CLASSES]
     )
-    return f'<div style="padding:0 .6em;font-size:.85em">class{rows}</div>'
+    return ColourLegend("class", marks=tuple(((r, g, b), words) for (r, g, b), words in marks))
 
 
 def _normals(points: np.ndarray) -> np.ndarray:

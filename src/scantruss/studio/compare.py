@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from html import escape
 from typing import Any
 
@@ -9,12 +10,17 @@ import numpy as np
 
 from ..check.distances import distances_to_grid
 from ..errors import InputError, words_of_number
+from ..export.model import model_of_truss
 from ..grid.grid import Grid
+from ..structure.build import scale_of
 from ..structure.checks import use_words
+from ..structure.truss import Truss
+from ..structure.variants import truss_arguments
 from .layers_tool import figures_of_layers
 from .state import NO_GRID, Design, StudioState
 from .support_places import supports_on
 
+NOTHING = 1e-9  #: distance that is none [mean member length]
 LONGEST_NAME = 40  #: of a design [letters]
 
 
@@ -31,9 +37,32 @@ def kept_design(state: StudioState, name: str) -> Design:
         raise InputError("there is no grid yet; press Generate")
     if not 0 < len(name) <= LONGEST_NAME:
         raise InputError(f"a design needs a name of 1 to {LONGEST_NAME} letters")
+    layered = state.shown_structure if state.solution is not None and state.solution.truss.layers is not None else None
     return Design(
-        name, state.grid, tuple(structure_figures(state)), state.cloud, state.asked, state.unpainted, state.is_live
+        name,
+        state.grid,
+        tuple(structure_figures(state)),
+        state.cloud,
+        state.asked,
+        state.unpainted,
+        state.is_live,
+        layered,
     )
+
+
+def drawn_members(design: Design) -> tuple[np.ndarray, np.ndarray]:
+    """Return what is drawn of a design: nodes (V, 3) in the frame of the scan [scan unit], and members (M, 2), of all layers."""
+    grid, asked = design.grid, design.layered
+    if asked is None:
+        return grid.scan_nodes, grid.edges
+    if design not in _LAYERED:
+        metres = scale_of(grid.unit or asked.unit, asked.scale)
+        model = model_of_truss(Truss.from_grid(grid, **truss_arguments(asked)))
+        _LAYERED[design] = model.nodes / metres, model.members
+    return _LAYERED[design]
+
+
+_LAYERED: weakref.WeakKeyDictionary[Design, tuple[np.ndarray, np.ndarray]] = weakref.WeakKeyDictionary()
 
 
 def taken_design(state: StudioState, name: str) -> dict[str, Any]:
@@ -95,8 +124,8 @@ def grid_figures(grid: Grid) -> list[tuple[str, str]]:
         ("members", f"{len(grid.edges):,}"),
         ("panels", f"{len(grid.panel_table):,} {grid.panels_are}"),
         ("member length, mean", f"{quality.length_mean:.4g}{unit}"),
-        ("length std / mean (CV)", f"{quality.length_cv:.4f}"),
-        ("shape quality G", f"{quality.shape_mean:.4f}"),
+        ("member length, std/mean", f"{quality.length_cv:.4f}"),
+        ("shape quality, 1 is regular", f"{quality.shape_mean:.4f}"),
         *(() if quality.planarity_max is None else (("farthest off its plane", f"{quality.planarity_max:.2%}"),)),
         ("members in all", f"{grid.lengths.sum():,.5g}{unit}"),
         ("node farthest from the scan", "-" if away is None else f"{away.largest.value:.3g}{unit}"),
@@ -118,5 +147,6 @@ def comparison(designs: list[Design]) -> str:
 def deviation(grid: Grid, other: Grid) -> np.ndarray:
     """Return how far the nodes of a grid lie from the triangles of another (V,) [scan unit]."""
     places = np.ascontiguousarray(grid.nodes + grid.origin - other.origin)
-    distance, _ = distances_to_grid(places, other, float(other.lengths.mean()))
-    return distance
+    length = float(other.lengths.mean())
+    distance, _ = distances_to_grid(places, other, length)
+    return np.where(distance < NOTHING * length, 0.0, distance)

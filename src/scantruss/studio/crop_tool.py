@@ -20,7 +20,11 @@ CROP_COLOR = (200, 90, 0)
 OUTSIDE_COLOR = np.array((190, 190, 195), np.uint8)
 CROP_MODE = "corner of crop"
 BOX_EDGES = np.array([(0, 1), (0, 2), (0, 4), (1, 3), (1, 5), (2, 3), (2, 6), (3, 7), (4, 5), (4, 6), (5, 7), (6, 7)])
-CROP_WAYS = ("Box", "Polygon", "All")
+CROP_WAYS = {
+    "Box": "a box with two handles that are dragged",
+    "Polygon": "corners that are clicked on the plan; Undo drops the last",
+    "All": "no crop: the whole scan",
+}
 
 
 def crosses_itself(corners: Sequence[Sequence[float]], *, closed: bool) -> bool:
@@ -57,9 +61,7 @@ class CropTool:
 
     def __init__(self, view: StudioView, gui: Any) -> None:
         self.view = view
-        ways = gui.add_button_group(
-            "draw", CROP_WAYS, hint="a box with two handles; corners clicked on the plan; no crop at all"
-        )
+        ways = view.rows.add("draw crop", CROP_WAYS)
         self.words = gui.add_text(
             "crop", "", hint="box:X0,Y0,Z0,X1,Y1,Z1, sphere:X,Y,Z,RADIUS or polygon:X,Y,X,Y,...; several with blanks"
         )
@@ -90,6 +92,11 @@ class CropTool:
                 check_rings(part)
         self.view.session.crop(parts)
         self._clear()
+
+    def put_away(self) -> None:
+        """Draw no box or polygon that has not been taken; its words stay in the field."""
+        if self._handles or self._corners:
+            self._clear()
 
     def _clear(self) -> None:
         """Draw nothing more of what was being chosen."""

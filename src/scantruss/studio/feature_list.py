@@ -27,6 +27,9 @@ class FeatureList:
     def __init__(self, view: StudioView, gui: Any) -> None:
         self.view, self._gui = view, gui
         self.shown = gui.add_checkbox("find and draw them", False)
+        self.none = gui.add_markdown(
+            "none found: the scan has no hole that could be closed, and no ridge", visible=False
+        )
         self._list = gui.add_folder(None)
         self._boxes: list[Any] = []
         self._drawn: tuple[list[Feature], frozenset[int]] = ([], frozenset())
@@ -60,6 +63,7 @@ class FeatureList:
     def fill(self, before: StudioState | None, state: StudioState) -> None:
         """Show the holes and ridges of a state."""
         features = self.view.session.features if self.shown.value and state.cloud is not None else []
+        self.none.visible = self.shown.value and self.view.session.has_looked and not features
         off = frozenset(switched_off(features, state.settings))
         if self._drawn[0] is features or (not features and not self._drawn[0]):
             if self._drawn[1] == off:

@@ -61,6 +61,19 @@ def find_features(cloud: PointCloud, settings: Settings) -> list[Feature]:
     return found
 
 
+def corners_of(cloud: PointCloud, settings: Settings) -> np.ndarray:
+    """Return the corners (C, 3) of the boundary of a scan, in its own frame [scan unit].
+
+    Raises
+    ------
+    ScanTrussError
+        The scan has no surface at this member length.
+    """
+    plain = settings.replace(fixed=(), fixed_lines=())
+    _, boundary = find_boundary(sample_surface(cloud, plain), plain)
+    return np.asarray(boundary.corners + cloud.origin)
+
+
 def switched_off(features: list[Feature], settings: Settings) -> dict[int, tuple[tuple[float, ...], ...]]:
     """Return the features that are closed or left alone by their number, with the places of the settings that name them."""
     found: dict[int, tuple[tuple[float, ...], ...]] = {}

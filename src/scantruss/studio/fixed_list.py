@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import InputError, words_of_place
+from ..errors import InputError, words_of_number, words_of_place
 from .dragging import DraggedBalls
 from .drawn_lines import clicked_point, numbers_of
 from .frame import SceneFrame
@@ -20,7 +20,11 @@ FIXED_COLOR = np.array((230, 97, 1), np.uint8)
 FIXED_RADIUS = 0.1  #: of a fixed node that is drawn [scene]
 NONE_CHOSEN = "-"
 FIX_MODE = "place fixed node"
-FIX_WAYS = ("Add", "Move", "Delete")
+FIX_WAYS = {
+    "Add": "a fixed node at x, y, z",
+    "Move": "the chosen node to x, y, z",
+    "Delete": "the chosen node",
+}
 
 
 class FixedNodes:
@@ -28,10 +32,13 @@ class FixedNodes:
 
     def __init__(self, view: StudioView, gui: Any) -> None:
         self.view = view
-        by_click = gui.add_button("Place by clicks", hint="then click on the scan; drag a ball to move it")
+        by_click = gui.add_button(
+            "Place by clicks",
+            hint="then click on the scan, near a corner of its boundary for the corner; drag a ball to move it",
+        )
         self.chosen = gui.add_dropdown("node", (NONE_CHOSEN,))
         self.words = gui.add_text("x, y, z", "", hint="in the frame of the scan, in its unit")
-        ways = gui.add_button_group("typed", FIX_WAYS, hint="Add x, y, z, or move the chosen node there")
+        ways = view.rows.add("typed node", FIX_WAYS)
         self._balls = DraggedBalls(view, "/fixed", lambda number, place: self._set(tuple(place.tolist()), number))
         view.corrects(self.words)
         by_click.on_click(view.step(lambda: setattr(view.click, "value", FIX_MODE)))
@@ -40,10 +47,10 @@ class FixedNodes:
         ways.on_click(view.chosen(self._do))
 
     def _do(self, way: str) -> None:
-        if way == FIX_WAYS[2]:
+        if way == "Delete":
             self._delete()
         else:
-            self._set(self._typed(), len(self._fixed) if way == FIX_WAYS[0] else self._number())
+            self._set(self._typed(), len(self._fixed) if way == "Add" else self._number())
 
     @property
     def _fixed(self) -> tuple[tuple[float, ...], ...]:
@@ -75,7 +82,20 @@ class FixedNodes:
         if len(places) and (there := nearest_point(places, origin, ahead)) is not None:
             self._show(there)
             return
-        self._set(tuple(clicked_point(self.view, origin, ahead).tolist()), len(self._fixed))
+        place = clicked_point(self.view, origin, ahead)
+        corner = self.view.session.corner_near(place)
+        if corner is not None:
+            if (known := next((k for k, one in enumerate(self._fixed) if np.allclose(one, corner)), None)) is not None:
+                self._show(known)
+                return
+            cloud = self.view.session.cloud
+            unit = f" {cloud.unit}" if cloud is not None and cloud.unit else ""
+            away = words_of_number(float(np.linalg.norm(corner - place)), 2) + unit
+            self.view.say(
+                f"placed on the corner of the boundary, {away} off the click; drag the ball, or type, to have it elsewhere"
+            )
+            place = corner
+        self._set(tuple(float(f"{c:.12g}") for c in place.tolist()), len(self._fixed))
 
     def _choose(self) -> None:
         self._show(self._number() if self.chosen.value != NONE_CHOSEN else -1)

@@ -89,11 +89,11 @@ def words_of_depths(asked: StructureSettings) -> str:
 
 
 def figures_of_layers(truss: Truss) -> list[tuple[str, str]]:
-    """Return members, mean length and CV of each layer and of the webs, in words; none of a single layer."""
+    """Return members, mean length and its deviation of each layer and of the webs, in words; none of a single layer."""
     if truss.layers is None:
         return []
     lengths = {name: truss.lengths[members] for name, members in truss.member_sets.items()}
     return [
-        (name, f"{len(own):,} members of {own.mean():.3g} m, CV {own.std() / own.mean():.3f}")
+        (name, f"{len(own):,} members of {own.mean():.3g} m, std/mean {own.std() / own.mean():.3f}")
         for name, own in lengths.items()
     ]

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+from .legend import ColourLegend
+
 LEGEND_WIDTH = 260  #: [pixel]
 LEGEND_GAP = 12  #: from the lower left corner of the drawing [pixel]
 
@@ -16,12 +18,19 @@ class Legends:
         with self._panel.add_tab("Legend"):
             self._html = gui.add_html("")
         self._panel.float(x=LEGEND_GAP, y=-LEGEND_GAP, width=LEGEND_WIDTH)
-        self._shown: dict[str, str] = {}
+        self._shown: dict[str, ColourLegend] = {}
 
-    def show(self, name: str, html: str) -> None:
-        """Show the legend of a part of the drawing; "" takes it away."""
-        if self._shown.get(name, "") == html:
+    @property
+    def shown(self) -> tuple[ColourLegend, ...]:
+        """Those that are seen."""
+        return tuple(self._shown.values())
+
+    def show(self, name: str, legend: ColourLegend | None) -> None:
+        """Show the legend of a part of the drawing; None takes it away."""
+        if self._shown.get(name) == legend:
             return
-        self._shown[name] = html
-        self._html.content = "".join(self._shown.values())
-        self._panel.visible = bool(self._html.content)
+        self._shown.pop(name, None)
+        if legend is not None:
+            self._shown[name] = legend
+        self._html.content = "".join(each.html() for each in self.shown)
+        self._panel.visible = bool(self._shown)

@@ -177,7 +177,7 @@ class LengthBrush:
         is_held = self.view.click.value == PAINT_MODE  # else it hides the grid
         if cloud is None or not field or isinstance(field, str) or not is_held:
             self.view.scene.remove("/painted")
-            self.view.legends.show("painted", "")
+            self.view.legends.show("painted", None)
             return
         rows = np.array(field, float)
         lengths = rows[:, 3] * settings.length / rows[:, 3].min()

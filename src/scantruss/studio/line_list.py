@@ -19,8 +19,12 @@ DRAW_MODE = "draw line"
 LINE_COLOR, CHOSEN_LINE_COLOR = (178, 24, 120), (230, 97, 1)
 DRAWN_LINE_WIDTH = 6.0  #: of a fixed line [pixel]
 SIGNIFICANT_OF_LINE = 9  #: digits of a coordinate of a line
-TYPED_WAYS = ("Add", "Delete")
-LINE_WAYS = ("Finish", "Close", "Drop point")
+TYPED_WAYS = {"Add": "the points above, as another line", "Delete": "the line that is chosen above"}
+LINE_WAYS = {
+    "Finish": "the line ends at its last point",
+    "Close": "back to its first point",
+    "Drop point": "the last one goes",
+}
 
 
 class LineList:
@@ -31,12 +35,10 @@ class LineList:
         draw = gui.add_button(
             "Draw by clicks", hint="then click points on the scan; the line follows the scan between them"
         )
-        ways = gui.add_button_group("line", LINE_WAYS, hint="Close: back to its first point")
+        ways = view.rows.add("line", LINE_WAYS)
         self.words = gui.add_text("points", "", hint="x, y, z; x, y, z; ... in the frame of the scan, in its unit")
         self.chosen = gui.add_dropdown("lines", (NONE_CHOSEN,))
-        typed = gui.add_button_group(
-            "typed", TYPED_WAYS, hint="Add the points above as a line, or delete the chosen line"
-        )
+        typed = view.rows.add("typed line", TYPED_WAYS)
         self._points: list[np.ndarray] = []
         self._count = 0
         view.corrects(self.words)
@@ -47,7 +49,7 @@ class LineList:
         view.modes[DRAW_MODE] = self._click
 
     def _typed(self, way: str) -> None:
-        if way == TYPED_WAYS[0]:
+        if way == "Add":
             self._add(np.array(points_of(self.words.value)))
         else:
             self._delete()
@@ -63,13 +65,13 @@ class LineList:
         self._show_points()
 
     def _go_on(self, way: str) -> None:
-        if way == LINE_WAYS[2]:
+        if way == "Drop point":
             self._points = self._points[:-1]
             self._show_points()
             return
-        if len(self._points) < 2 + (way == LINE_WAYS[1]):
+        if len(self._points) < 2 + (way == "Close"):
             raise InputError("a line needs two points, a closed one three; click on the scan")
-        self._add(np.array([*self._points, *self._points[: way == LINE_WAYS[1]]]))
+        self._add(np.array([*self._points, *self._points[: way == "Close"]]))
 
     def _show_points(self) -> None:
         """Draw the line that is being drawn."""

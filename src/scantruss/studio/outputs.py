@@ -16,7 +16,7 @@ from ..structure.options import settings_text
 from .project import save_project
 from .state import StudioState
 
-TAKEN = "taken.ply"  # the points that are taken, where some were removed by hand
+TAKEN = "taken.ply"  # the points that are taken, where some were removed by hand or the scan was turned
 EFFORT_OF_PREVIEW = "quick"
 PREVIEW_WORDS = "this is the quick preview; press **Generate** for the final grid"
 CLEANED = "clean.ply"  # the scan without the points that were removed
@@ -77,7 +77,7 @@ def _of_the_file(state: StudioState) -> Settings:
     made = state.settings if state.grid is None or state.asked is None else state.asked
     if state.is_live:
         made = made.replace(effort=EFFORT_OF_PREVIEW)
-    if state.removed is not None:
+    if not state.is_of_file:
         return made.replace(classes=(), crop=())
     if state.cleaning is None:
         return made
@@ -87,13 +87,13 @@ def _of_the_file(state: StudioState) -> Settings:
 def settings_files(state: StudioState) -> dict[str, bytes]:
     """Return the settings of the grid and of the structure as the command line reads them, and the points.
 
-    The points are there where some were removed by hand, which no option repeats.
+    The points are there where some were removed by hand or the scan was turned, which no option repeats.
     """
     made = _of_the_file(state)
     files = {"settings.json": (json.dumps(made.to_dict(), indent=1, ensure_ascii=False) + "\n").encode()}
     if state.solution is not None:
         files["structure.toml"] = settings_text(state.shown_structure).encode()
-    if state.removed is not None and state.cloud is not None:
+    if not state.is_of_file and state.cloud is not None:
         with temporary_folder() as folder:
             cloud = state.cloud
             write_points(
@@ -107,7 +107,7 @@ def command_of(state: StudioState) -> str:
     """Return the command lines that repeat the grid and the structure with the files of `settings_files`."""
     name = Path(state.cloud.name).name if state.cloud is not None and state.cloud.name else "SCAN"
     made, lines = _of_the_file(state), []
-    if state.removed is not None:
+    if not state.is_of_file:
         name = TAKEN
     elif state.cleaning is not None:
         classes = state.settings.classes

@@ -20,6 +20,11 @@ const complete = () => {
     for (const each of document.querySelectorAll(`.${mark}`)) (each.closest("button") ?? each).setAttribute("aria-label", name);
   for (const each of document.querySelectorAll("[role=slider][aria-label=''], [role=slider]:not([aria-label]), input:not([aria-label])"))
     if (!each.labels?.length) each.setAttribute("aria-label", labelOf(each));
+  const hints = JSON.parse(document.querySelector("[data-hints]")?.dataset.hints ?? "{}");
+  for (const each of document.querySelectorAll("button[data-size=compact-xs]:not([title])")) {
+    const words = hints[labelOf(each)]?.[each.textContent.trim()];
+    if (words) each.title = words;  // which come after the first of the rows
+  }
   const drawing = drawn();
   if (drawing && !drawing.hasAttribute("tabindex")) prepare(drawing);
 };

@@ -34,11 +34,13 @@ addEventListener("DOMContentLoaded", () => document.body.addEventListener("keydo
 
 // A part of a picture that stands for a range of values (data-low to data-high) gives it to the text field that it names (data-field) by a click,
 // by Enter, or with others by dragging from one to the other.
-const give = (name, low, high) => {
-  const label = [...document.querySelectorAll("label")].find((each) => each.textContent.trim() === name);
-  let around = label;
+const fieldOf = (name) => {
+  let around = [...document.querySelectorAll("label")].find((each) => each.textContent.trim() === name);
   while (around && !around.querySelector("input")) around = around.parentElement;
-  const input = around?.querySelector("input");
+  return around?.querySelector("input");
+};
+const give = (name, low, high) => {
+  const input = fieldOf(name);
   if (!input) return;
   const text = low === high ? `${low}` : `${low}, ${high}`;
   const typed = text === input.value ? `${text} ` : text;  // which counts again
@@ -66,3 +68,11 @@ addEventListener("keydown", (event) => {
   event.preventDefault();
   give(part.dataset.field, part.dataset.low, part.dataset.high);
 });
+
+// The server is told which tabs are seen, in a text field that is not: what a click on the drawing does ends with its tab.
+const tellTabs = () => {
+  const open = [...document.querySelectorAll("[role=tab][aria-selected=true]")].map((each) => each.textContent.trim()).join(",");
+  if (open !== fieldOf("open tabs")?.value) give("open tabs", open, open);
+};
+addEventListener("DOMContentLoaded", () =>
+  new MutationObserver(tellTabs).observe(document.body, { subtree: true, attributes: true, attributeFilter: ["aria-selected"] }));

@@ -11,6 +11,7 @@ import numpy as np
 from ..errors import InputError
 from ..runtime.progress import Progress
 from .frame import ROOM_AROUND
+from .legend import with_legends
 from .scene import sky
 
 if TYPE_CHECKING:
@@ -63,7 +64,11 @@ class PictureTool:
         """Return what the browser draws before the sky or a plain page, (height, width, 3) uint8."""
         look, scene = self.view.look, self.view.scene
         is_fine, is_dark = bool(look.tubes.value), bool(look.dark.value)
+        times = max(height / max(float(self.view.client.camera.image_height), 1.0), 1.0)
         try:
+            if times > 1.0:
+                look.draw(for_picture=True)
+                scene.widen_lines(times)
             scene.api.set_background_image(None)  # the page stretches it to its own window
             pixels = self.view.client.get_render(
                 height, width, timeout=PICTURE_PATIENCE, transport_format="png", **camera
@@ -71,9 +76,13 @@ class PictureTool:
         except (RuntimeError, TimeoutError):
             raise InputError("the browser gave no picture; keep the page open and in front") from None
         finally:
+            if times > 1.0:
+                look.draw()
+                scene.widen_lines(1.0)
             if is_fine:
                 scene.api.set_background_image(sky(is_dark))
-        return over(pixels, sky(is_dark, height) if is_fine else np.array(BEHIND_PICTURE[is_dark], np.uint8))
+        picture = over(pixels, sky(is_dark, height) if is_fine else np.array(BEHIND_PICTURE[is_dark], np.uint8))
+        return with_legends(picture, self.view.legends.shown, is_dark)
 
     def _send(self, name: str, frames: list[np.ndarray], kind: str) -> None:
         from PIL import Image

@@ -23,7 +23,7 @@ from ..settings import Settings
 from ..structure.options import StructureSettings, read_structure_settings, settings_text
 from ..structure.results import Solution
 from .project_trade import TRADE_BEFORE, TRADE_HEAD, TRADE_NODES, head_of_trade, nodes_of_trade, trade_of_parts
-from .scan_parts import Cleaning, WholeScan, part_of_scan, taken_of_scan
+from .scan_parts import UP_AXES, Cleaning, WholeScan, part_of_scan, taken_of_scan
 from .state import Design, StudioState, Trade
 from .support_places import placed
 
@@ -51,7 +51,7 @@ def save_project(path: Path, state: StudioState) -> None:
     head = {
         "format": PROJECT_FORMAT, "format_version": PROJECT_VERSION, "made_by": MARK,
         "scan": {"unit": cloud.unit, "system": cloud.system, "name": Path(cloud.name).name, "dropped": cloud.dropped,
-                 "notes": list(cloud.notes), "left_out": [list(part) for part in cloud.left_out]},
+                 "notes": list(cloud.notes), "up": whole.up, "left_out": [list(part) for part in cloud.left_out]},
         "cleaning": None if cleaning is None else [cleaning.outlier_distance, cleaning.loose_pieces, list(cleaning.crop)],
         "settings": state.settings.to_dict(), "solved": solved, "quick": state.is_live,
         "asked": None if state.asked is None else state.asked.to_dict(),
@@ -100,11 +100,12 @@ def _head_of_design(design: Design, state: StudioState) -> dict[str, Any]:
         "name": design.name, "figures": [list(row) for row in design.figures], "of_scan": design.cloud is state.cloud,
         "asked": None if design.asked is None else design.asked.to_dict(), "unpainted": design.unpainted,
         "quick": design.is_live,
+        "layered": None if design.layered is None else settings_text(design.layered),
     }  # fmt: skip
 
 
 def _design_of(head: dict[str, Any], grid: Grid, cloud: PointCloud) -> Design:
-    asked = head.get("asked")
+    asked, layered = head.get("asked"), head.get("layered")
     return Design(
         head["name"],
         grid,
@@ -113,6 +114,7 @@ def _design_of(head: dict[str, Any], grid: Grid, cloud: PointCloud) -> Design:
         None if asked is None else Settings.from_dict(asked),
         float(head.get("unpainted", 1.0)),
         bool(head.get("quick", False)),
+        None if layered is None else _structure_settings_of(layered.encode()),
     )
 
 
@@ -183,7 +185,7 @@ def _project_of(parts: dict[str, bytes]) -> tuple[StudioState, bool]:
         raise ValueError("points must be numbers")
     grid = _grid_of(parts["grid.json"]) if "grid.json" in parts else None
     asked, settings = head.get("asked"), Settings.from_dict(head["settings"])
-    whole, cleaning = WholeScan(cloud, classes, colors), None
+    whole, cleaning = WholeScan(cloud, classes, colors, _up_of(scan)), None
     if (numbers := head.get("cleaning")) is not None:
         of = np.ones(len(cloud.points), np.bool_)
         if head["format_version"] <= CLEANING_OF_PART:
@@ -217,6 +219,13 @@ def _project_of(parts: dict[str, bytes]) -> tuple[StudioState, bool]:
         tape=tuple(tuple(map(float, end)) for end in head.get("tape", ())),
     )
     return state, bool(head["solved"]) and grid is not None
+
+
+def _up_of(scan: dict[str, Any]) -> str:
+    up = str(scan.get("up", "z"))
+    if up not in UP_AXES:
+        raise ValueError(f"no axis {up} points up")
+    return up
 
 
 def _grid_of(content: bytes) -> Grid:

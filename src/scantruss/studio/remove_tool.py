@@ -13,7 +13,11 @@ if TYPE_CHECKING:
     from .state import StudioState
     from .view import StudioView
 
-REMOVE_WAYS = ("Mark", "Unmark all", "Remove")
+REMOVE_WAYS = {
+    "Mark": "then hold Shift and drag a rectangle on the drawing, as often as you like",
+    "Unmark all": "marks no point any more",
+    "Remove": "takes the marked points, drawn in red, away",
+}
 
 
 class RemoveTool:
@@ -21,11 +25,7 @@ class RemoveTool:
 
     def __init__(self, view: StudioView, gui: Any) -> None:
         self.view = view
-        ways = gui.add_button_group(
-            "points",
-            REMOVE_WAYS,
-            hint="Mark: then hold Shift and drag a rectangle on the drawing, as often as you like",
-        )
+        ways = view.rows.add("points", REMOVE_WAYS)
         self.about = gui.add_markdown("")
         restore = gui.add_button("Take them again", hint="all points that were removed by hand")
         self._marked: np.ndarray | None = None

@@ -13,6 +13,10 @@ from ..scan.formats.choose import choose, describe_points
 from ..selection import Selection
 from ..settings import Settings
 
+UP_AXES = {
+    "z": ((1, 0, 0), (0, 1, 0), (0, 0, 1)), "y": ((1, 0, 0), (0, 0, -1), (0, 1, 0)), "x": ((0, 0, -1), (0, 1, 0), (1, 0, 0)),
+    "-z": ((1, 0, 0), (0, -1, 0), (0, 0, -1)), "-y": ((1, 0, 0), (0, 0, 1), (0, -1, 0)), "-x": ((0, 0, 1), (0, 1, 0), (-1, 0, 0)),
+}  # fmt: skip  #: x, y and z of a scan in axes of its file, by the axis that points up
 CLEANING_STEPS = ("duplicates", "near_duplicates", "outliers", "pieces")  #: those that only remove points
 
 
@@ -40,6 +44,7 @@ class WholeScan:
     cloud: PointCloud
     classes: np.ndarray | None = None  #: (N,) of its points, where the file has them
     colors: np.ndarray | None = None  #: (N, 3) uint8, where the file has them
+    up: str = "z"  #: axis of the file that points up, of `UP_AXES`
 
     @property
     def held_classes(self) -> tuple[int, ...]:
@@ -113,6 +118,16 @@ def part_of_scan(
 ) -> PointCloud:
     """Return the points that are taken; see `taken_of_scan`."""
     return _taken(whole.cloud, taken_of_scan(whole, settings, cleaning, removed))
+
+
+def turned(whole: WholeScan, up: str) -> WholeScan:
+    """Return a scan with another axis of its file upwards, turned about the origin; no reference system has such coordinates."""
+    turn = np.array(UP_AXES[up], float) @ np.array(UP_AXES[whole.up], float).T
+    cloud = whole.cloud
+    normals = None if cloud.normals is None else np.ascontiguousarray(cloud.normals @ turn.T)
+    made = PointCloud.from_array((cloud.points + cloud.origin) @ turn.T, cloud.unit, cloud.name, normals)
+    made = replace(made, notes=cloud.notes, dropped=cloud.dropped, left_out=cloud.left_out)
+    return replace(whole, cloud=made, up=up)
 
 
 def _taken(cloud: PointCloud, kept: np.ndarray) -> PointCloud:

@@ -17,12 +17,15 @@ from ..settings import Settings
 from .grid_files import changes_of_grid, is_grid_file, refuse_grid_without_scan
 from .opening import DATA_FOLDER, EXAMPLES, called, marks_of, next_free, read_whole
 from .project import read_project
-from .scan_parts import Cleaning, WholeScan, cleaning_of, part_of_scan
+from .scan_parts import Cleaning, WholeScan, cleaning_of, part_of_scan, turned
 from .solving import solved_again
 from .state import NO_GRID, StudioState
 from .steps import Steps
 from .support_places import for_new_scan
 
+PLACED_SETTINGS = (
+    "crop", "length_field", "rows_along", "boundary", "fill_at", "fixed", "fixed_lines", "line_names", "symmetry", "no_ridge_at",
+)  # fmt: skip  #: those that name places or directions
 LARGEST_UPLOAD = 500_000_000  #: of a scan that comes through the page [bytes]
 TOO_LARGE = f"a scan of more than {LARGEST_UPLOAD:,} bytes; name it on the command line: scantruss studio SCAN"
 
@@ -179,16 +182,54 @@ class ScanSteps(Steps):
         self.save()
 
     def set_unit(self, unit: str) -> None:
-        """Take the unit of the scan's coordinates; the grid of the scan without it is gone."""
-        self.stop()
+        """Take the unit of the scan's coordinates; the grid of the scan without it is gone.
+
+        Raises
+        ------
+        InputError
+            There is no scan, or it is still being read.
+        """
         cloud, whole = self.cloud, self.state.whole
+        if cloud is None:
+            raise InputError("there is no scan yet; open one")
+        self.stop()
         self._turn += 1
-        part = None if cloud is None else replace(cloud, unit=unit, system="")
+        part = replace(cloud, unit=unit, system="")
         if whole is not None:
-            same = part is not None and whole.cloud is cloud
-            whole = replace(whole, cloud=part if same and part else replace(whole.cloud, unit=unit, system=""))
+            whole = replace(whole, cloud=part if whole.cloud is cloud else replace(whole.cloud, unit=unit, system=""))
         self.change("unit", cloud=part, whole=whole, settings=self.settings.replace(unit=unit), **NO_GRID)
         self.save()
+        self.show_quick()
+
+    def turn(self, up: str) -> None:
+        """Turn the scan so that an axis of its file points up; what was placed on it, cropped or made of it is gone.
+
+        Raises
+        ------
+        InputError
+            There is no scan.
+        """
+        whole, cleaning, removed = self.state.whole, self.state.cleaning, self.state.removed
+        if whole is None:
+            raise InputError("there is no scan yet; open one")
+        if whole.up == up:
+            return
+        self.stop()
+        self._turn += 1
+        self._forget_features()
+        whole, usual = turned(whole, up), Settings(length=self.state.main_length)
+        settings = self.settings.replace(
+            length=usual.length, **{name: getattr(usual, name) for name in PLACED_SETTINGS}
+        )
+        if cleaning is not None:  # its crop is gone, and what it removed stays so
+            removed = cleaning.removes if removed is None else cleaning.removes | removed
+        self.change(
+            f"up {up}", whole=whole, cloud=part_of_scan(whole, settings, None, removed), cleaning=None, removed=removed, tape=(),
+            settings=settings, unpainted=1.0, structure_settings=for_new_scan(self.state.structure_settings), solved_with=None,
+            support_places=(), **NO_GRID,
+        )  # fmt: skip
+        self.save()
+        self.tell()
         self.show_quick()
 
     def length_bounds(self) -> tuple[float, float]:

@@ -13,6 +13,7 @@ from .tone import to_be_seen
 
 if TYPE_CHECKING:
     from ..export.model import Model
+    from .legend import ColourLegend
     from .state import StudioState
 
 FRONT_COLOR = np.array((240, 190, 90), np.uint8)
@@ -60,10 +61,13 @@ class Scene:
         scene.set_up_direction("+z")
         self.light(False)
         self._scan_key: tuple[Any, ...] = ()
+        self._widths: dict[str, float] = {}  # of lines by their names, as on the page [pixel]
         self._front: tuple[np.ndarray, np.ndarray] | None = None
-        self._scan_legend = ""
+        self._scan_legend: ColourLegend | None = None
 
-    def scan(self, state: StudioState, wanted: str, section: SectionPlane | None, most: int = DRAWN_POINTS) -> str:
+    def scan(
+        self, state: StudioState, wanted: str, section: SectionPlane | None, most: int = DRAWN_POINTS
+    ) -> ColourLegend | None:
         """Draw the scan of a state, thinned, and return the legend of its colours, where there is one.
 
         Parameters
@@ -89,7 +93,7 @@ class Scene:
 
     def remove_scan(self) -> None:
         """Draw no scan."""
-        self._scan_key, self._scan_legend = (), ""
+        self._scan_key, self._scan_legend = (), None
         self.remove("/scan")
 
     def remove(self, *names: str) -> None:
@@ -117,9 +121,16 @@ class Scene:
         else:
             self.remove("/ground")
 
-    def members(self, name: str, ends: np.ndarray, colors: np.ndarray, width: float = LINE_WIDTH) -> None:
-        """Draw the members (M, 2, 3) of a grid: as lines, or where these are too many as rows of points, which cost less."""
-        few, many = (ends, ends[:0]) if len(ends) <= MOST_DRAWN_LINES else (ends[:0], ends)
+    def members(
+        self,
+        name: str,
+        ends: np.ndarray,
+        colors: np.ndarray,
+        width: float = LINE_WIDTH,
+        most: int | None = MOST_DRAWN_LINES,
+    ) -> None:
+        """Draw the members (M, 2, 3) of a grid: as lines, or where these are more than `most` as rows of points, which cost less."""
+        few, many = (ends, ends[:0]) if most is None or len(ends) <= most else (ends[:0], ends)
         self.lines(name, few, colors[: len(few)], width)
         beads = int(np.clip(MOST_BEADS // max(len(many), 1), *BEADS))
         step = float(np.linalg.norm(many[:, 1] - many[:, 0], axis=1).mean()) / beads if len(many) else 1.0
@@ -156,10 +167,17 @@ class Scene:
         if not len(ends):
             self.remove(name)
             return
+        self._widths[name] = width
         each = np.broadcast_to(to_be_seen(colors), (len(ends), 3))
         self.api.add_line_segments(
             name, ends.astype(np.float32), np.repeat(each[:, None], 2, axis=1), thickness=width, thickness_units="screen"
         )  # fmt: skip
+
+    def widen_lines(self, times: float) -> None:
+        """Draw all lines so many times as wide as usual, as a picture of more pixels than the page needs."""
+        for name, width in self._widths.items():
+            if (handle := self.api.get_handle_by_name(name)) is not None:
+                handle.thickness = times * width
 
     def chain(self, name: str, places: np.ndarray, closed: bool, color: tuple[int, int, int], width: float) -> None:
         """Draw a polyline (M, 3)."""

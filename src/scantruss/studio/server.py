@@ -59,6 +59,7 @@ class Guard:
 
     def __init__(self, host: str) -> None:
         self._pages: dict[bool, tuple[bytes, bytes]] = {}  # as viser has them and as they are served
+        self.name = secrets.token_urlsafe(8)  #: by which a page knows that the server was started again
         self.token = "" if host in LOOPBACK else secrets.token_urlsafe(24)
 
     def refusal(self, path: str, headers: Any) -> str:
@@ -116,7 +117,8 @@ class Guard:
                 head = Headers({"Content-Type": "text/plain; charset=utf-8", "Connection": "close"})
                 return Response(http.HTTPStatus.FORBIDDEN, "Forbidden", head, f"{words}\n".encode())
             if urlsplit(request.path).path == ALIVE:
-                return Response(http.HTTPStatus.NO_CONTENT, "No Content", Headers({"Cache-Control": "no-store"}), b"")
+                head = Headers({"Content-Type": "text/plain; charset=utf-8", "Cache-Control": "no-store"})
+                return Response(http.HTTPStatus.OK, "OK", head, self.name.encode())
             answer = inner(connection, request)
             if answer is not None:
                 if answer.headers.get("Content-Type", "").startswith("text/html"):

@@ -20,7 +20,7 @@ from ..settings import Settings
 from ..structure.options import loads_of_words
 from ..surface.samples import sample_surface
 from .compare import kept_design, taken_design
-from .features import Feature, find_features, switched_off
+from .features import Feature, corners_of, find_features, switched_off
 from .outputs import EFFORT_OF_PREVIEW, command_of, files_of, model_to_show
 from .solving import check_words, solved_state
 from .state import NO_GRID
@@ -40,6 +40,7 @@ class Session(TradeSteps):
         self.features: list[Feature] = []
         self.wants_features = False  #: whether holes and ridges are looked for after each grid
         self._features_of: tuple[PointCloud, Settings] | None = None
+        self._corners: tuple[PointCloud, Settings, np.ndarray] | None = None
         self.front: tuple[np.ndarray, np.ndarray] | None = None  #: nodes and triangles of a front that advances
         self._front_seen = 0.0
 
@@ -167,6 +168,11 @@ class Session(TradeSteps):
         if not self.show_quick():  # which looks for them too
             self._look_for_features()
 
+    @property
+    def has_looked(self) -> bool:
+        """Whether holes and ridges of the present scan have been looked for."""
+        return self._features_of is not None and self._features_of[0] is self.cloud
+
     def _find_features(self, progress: Progress) -> None:
         cloud, settings = self.cloud, self.settings.replace(fill_at=(), no_ridge_at=(), effort="quick")
         if not self.wants_features or cloud is None:
@@ -185,6 +191,17 @@ class Session(TradeSteps):
         places = getattr(self.settings, feature.kind)
         left = tuple(place for place in places if place not in named) if named else (*places, feature.place)
         self.set(f"{'hole' if feature.kind == 'fill_at' else 'ridge'} {number + 1}", **{feature.kind: left})
+
+    def corner_near(self, place: np.ndarray) -> np.ndarray | None:
+        """Return the corner (3,) of the boundary that lies within half a member of a place; None where none does [scan unit]."""
+        cloud, settings = self.cloud, self.settings.replace(fixed=(), fixed_lines=(), effort="quick")
+        if cloud is None:
+            return None
+        if self._corners is None or self._corners[0] is not cloud or self._corners[1] != settings:
+            self._corners = (cloud, settings, corners_of(cloud, settings))
+        corners = self._corners[2]
+        away = np.linalg.norm(corners - place, axis=1)
+        return corners[int(away.argmin())] if len(corners) and away.min() <= settings.length / 2 else None
 
     def fix(self, places: tuple[tuple[float, ...], ...], words: str = "fixed node") -> None:
         """Take the positions that must become nodes, in the frame of the scan [scan unit].

@@ -34,6 +34,7 @@ class Design:
     asked: Settings | None = None  #: with which it was asked for
     unpainted: float = 1.0  #: see `StudioState`
     is_live: bool = False  #: whether it is a quick one
+    layered: StructureSettings | None = None  #: with which a structure of more layers was made of it, which are drawn
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +75,11 @@ class StudioState:
     tape: tuple[
         tuple[float, ...], ...
     ] = ()  #: both ends of what was measured last, in the frame of the scan [scan unit]
+
+    @property
+    def is_of_file(self) -> bool:
+        """Whether options make of its file what is taken of the scan: none removes points by hand, or turns it."""
+        return self.removed is None and (self.whole is None or self.whole.up == "z")
 
     def taken(self) -> np.ndarray:
         """Return which points of the whole scan are taken (N,)."""

@@ -24,12 +24,13 @@ PANEL_STYLE = """<style>
 .mantine-Notification-closeButton { pointer-events: auto }
 :is(.mantine-Input-input, .mantine-Checkbox-input:not(:checked)) { border-color: #868e96 !important }
 [data-mantine-color-scheme="dark"] .mantine-Checkbox-input:checked { border-color: #8cc4f8 !important }
+div:has(> .studio-unseen), div:has(> .studio-unseen) + div { display: none }
 .studio-head { padding: .3em .8em 0; line-height: 1.35; font-size: .95em }
 .studio-head > [role="status"] { height: 2.7em; overflow-y: auto }
 :has(> div > div > div > .studio-head) { overflow: visible !important }
 div:has(> .studio-head), div:has(> .studio-head) + div + div, div:has(> .studio-head) + div + div + div,
   div:has(> .studio-head) + div + div + div + div {
-  position: sticky !important; z-index: 3; background: var(--mantine-color-body); margin: 0 !important }
+  position: sticky !important; z-index: 20; background: var(--mantine-color-body); margin: 0 !important }
 div:has(> .studio-head) { top: 0; height: 60px }
 div:has(> .studio-head) + div + div { top: 60px; height: 16px }
 div:has(> .studio-head) + div + div + div { top: 76px; height: 36px; padding: 0 var(--mantine-spacing-xs) }

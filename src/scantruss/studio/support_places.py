@@ -8,10 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, words_of_place
+from ..errors import InputError, ScanTrussError, words_of_place
 from ..grid.grid import Grid
 from ..grid.marks import node_marks
 from ..structure.options import StructureSettings
+from ..structure.truss import Truss
+from .page_words import in_words_of_page
 from .state import DEFAULT_STRUCTURE, Placed, StudioState
 
 NODE_MARK = re.compile(r"N\d+\??")
@@ -31,6 +33,26 @@ def marks_of(supports: str) -> list[str]:
 def marks_of_grid(state: StudioState) -> list[str]:
     """Return the mark of each node of the grid; a structure with more layers may count its nodes with more digits."""
     return [] if state.grid is None else node_marks(state.grid)
+
+
+def is_untouched(state: StudioState) -> bool:
+    """Whether the supports are the usual ones, of which nobody has made a structure."""
+    return state.structure_settings.supports == DEFAULT_STRUCTURE.supports and state.solved_with is None
+
+
+def asked_supports(state: StudioState) -> tuple[np.ndarray, str]:
+    """Return the nodes (K,) of the grid that the supports of the next structure name, and why there are none; "" where there are."""
+    none, asked = np.zeros(0, np.int64), state.structure_settings
+    if state.grid is None:
+        return none, ""
+    if words := words_of_lost(state):
+        return none, words
+    unit = state.grid.unit or asked.unit or "m"  # which heights above the lowest node need alone
+    try:
+        truss = Truss.from_grid(state.grid, unit=unit, scale=asked.scale, supports=asked.supports)
+    except ScanTrussError as error:
+        return none, in_words_of_page(" ".join(str(error).split()))
+    return np.flatnonzero((truss.supports != 0).any(axis=1)), ""
 
 
 def switched(supports: str, mark: str) -> str:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .colours import colors_of, legend_of
-from .compare import comparison, deviation, kept_design
+from .compare import comparison, deviation, drawn_members, kept_design
 from .frame import BESIDE_FIRST, DRAWN_EXTENT
 from .state import Design
 
@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 PRESENT = "the present one"
 NO_OTHER = "-"
 TAKE = "Take {} as the present one"
-LABEL_ABOVE = 1.2  #: of the name of a design over its highest node [scene]
+NAME_SIZE = 1.3  #: of the name of a design [usual label]
+LABEL_ABOVE = 0.3  #: of the name of a design over its highest node [scene]
 
 
 class CompareTab:
@@ -94,22 +95,27 @@ class CompareTab:
         self.taken.disabled = chosen is None
         self.taken.label = TAKE.format("it" if chosen is None else chosen.name)
         if chosen is None or state.cloud is None:
-            self.view.legends.show("beside", "")
+            self.view.legends.show("beside", None)
             scene.remove("/beside/members", "/beside/panels", "/beside/name", "/beside/present")
             return
         frame = self.view.frame
         aside = 0.0 if self.is_over else BESIDE_FIRST * DRAWN_EXTENT
-        nodes = frame.to_scene(chosen.grid.scan_nodes) + np.array([aside, 0.0, 0.0], np.float32)
-        values = chosen.grid.lengths
-        words = "member length"
+        there = np.array([aside, 0.0, 0.0], np.float32)
+        all_nodes, members = drawn_members(chosen)
+        nodes, corners = (frame.to_scene(each) + there for each in (all_nodes, chosen.grid.scan_nodes))
+        values, words = lengths_of(chosen), "member length"
         if self.distance.value and state.grid is not None:
-            values = deviation(chosen.grid, state.grid)[chosen.grid.edges].mean(axis=1)
+            values, members, nodes = (
+                deviation(chosen.grid, state.grid)[chosen.grid.edges].mean(axis=1),
+                chosen.grid.edges,
+                corners,
+            )
             words = "distance from the present design"
         colors, low, high = colors_of(values, None, self.ends)
         legend = legend_of(f"{chosen.name}: {words}", chosen.grid.unit, low, high, False)
         self.view.legends.show("beside", legend)
-        scene.lines("/beside/members", nodes[chosen.grid.edges], colors)
-        scene.panels("/beside/panels", nodes, chosen.grid.triangles, None, 0.25, chosen.grid.panel_table)
+        scene.lines("/beside/members", nodes[members], colors)
+        scene.panels("/beside/panels", corners, chosen.grid.triangles, None, 0.25, chosen.grid.panel_table)
         if self.is_over or state.grid is None:
             scene.remove("/beside/present")
             self._name(
@@ -120,20 +126,25 @@ class CompareTab:
         self._name("/beside/present", PRESENT, frame.to_scene(state.grid.scan_nodes))
 
     def _name(self, part: str, words: str, nodes: np.ndarray) -> None:
-        """Write a name above the middle of a grid with nodes (V, 3) in the scene."""
+        """Write a name above the far side of a grid with nodes (V, 3) in the scene, so that it hides nothing when it is first seen."""
         low, high = nodes.min(axis=0), nodes.max(axis=0)
-        above = (*((low + high) / 2)[:2].tolist(), float(high[2]) + LABEL_ABOVE)
-        self.view.scene.api.add_label(part, words, position=above)
+        above = (float(low[0] + high[0]) / 2, float(high[1]), float(high[2]) + LABEL_ABOVE)
+        self.view.scene.api.add_label(part, words, position=above, anchor="bottom-center", font_screen_scale=NAME_SIZE)
 
     @property
     def ends(self) -> tuple[float, float] | None:
-        """Ends of one scale of member lengths, of the present design and the one beside it; None where none is."""
-        state = self.view.session.state
-        chosen = self._chosen(state)
-        if chosen is None or state.grid is None or self.distance.value:
+        """Ends of one scale of member lengths, of the present design and the one beside it [scan unit]; None where there is none."""
+        chosen, shown = self._chosen(self.view.session.state), self.view.shown_model()
+        if chosen is None or shown is None or self.distance.value:
             return None
-        both = np.concatenate([chosen.grid.lengths, state.grid.lengths])
+        both = np.concatenate([lengths_of(chosen), shown[0].lengths / self.view.unit_of(shown[0])])
         return float(both.min()), float(both.max())
 
     def _chosen(self, state: StudioState) -> Design | None:
         return next((each for each in state.designs if each.name == self.other.value), None)
+
+
+def lengths_of(design: Design) -> np.ndarray:
+    """Return the lengths of the members of a design that are drawn (M,) [scan unit]."""
+    nodes, members = drawn_members(design)
+    return np.asarray(np.linalg.norm(nodes[members[:, 1]] - nodes[members[:, 0]], axis=1))

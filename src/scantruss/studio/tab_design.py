@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from .view import StudioView
 
 SLIDER_STEPS = 100
+PREFERENCES = dict(zip(("both", "equal lengths", "regular panels"), PREFER, strict=True))  #: setting by its words
 NO_WORDS = "&nbsp;"  #: of a paragraph
 
 
@@ -31,7 +32,7 @@ class DesignTab:
         self.figures = gui.add_markdown("")
         self.cells = CellsTool(view, gui)
         self.effort = gui.add_dropdown("effort", EFFORTS, hint="of Generate")
-        self.prefer = gui.add_dropdown("prefer", PREFER, hint="what matters more: equal members or regular triangles")
+        self.prefer = gui.add_dropdown("prefer", tuple(PREFERENCES), hint="what matters more")
         with gui.add_folder("Holes and ridges", expand_by_default=False):
             self.features = FeatureList(view, gui)
         with gui.add_folder("Direction of rows", expand_by_default=False):
@@ -43,7 +44,7 @@ class DesignTab:
         self.slider.on_update(view.slid(self._slide))
         view.typed(self.length, self._typed)
         self.effort.on_update(step(lambda: session.set_quietly("effort", effort=self.effort.value)))
-        self.prefer.on_update(step(lambda: session.set("prefer", prefer=self.prefer.value)))
+        self.prefer.on_update(step(lambda: session.set("prefer", prefer=PREFERENCES[self.prefer.value])))
 
     def _slide(self) -> None:
         length = float(f"{self.slider.value:.4g}")
@@ -68,7 +69,8 @@ class DesignTab:
             length = float(f"{state.main_length:.9g}")
             if abs(self.slider.value - length) > 1e-9 * length:
                 self.slider.value = min(max(length, self.slider.min), self.slider.max)
-            self.effort.value, self.prefer.value = settings.effort, settings.prefer
+            self.effort.value = settings.effort
+            self.prefer.value = next(words for words, name in PREFERENCES.items() if name == settings.prefer)
         if not session.message:  # else what was refused stands there
             self.view.show_text(self.length, f"{float(f'{state.main_length:.9g}'):g}")
         self._fill_grid(state)
@@ -88,7 +90,7 @@ class DesignTab:
             quick = " (before the last change)"
         self.figures.content = (
             f"{len(grid.nodes):,} nodes, {len(grid.edges):,} members{words_of_panels(grid)}{quick}\n\n"
-            f"length {quality.length_mean:.4g}{unit}, CV {quality.length_cv:.4f}, G {quality.shape_mean:.4f}"
+            f"length {quality.length_mean:.4g}{unit}, std/mean {quality.length_cv:.4f}; shape {quality.shape_mean:.4f}, 1 is regular"
             f"{words_of_planes(grid)}"
         )
         if certificate is None:

@@ -9,9 +9,10 @@ import numpy as np
 from ..export.page_tables import PageColumn, colorings_of
 from ..grid.panels import panel_of_triangles
 from .certificate_list import CertificateList
-from .colours import BRUSHED, DIMMED, colors_of, histogram_of, legend_of, legend_of_more, rgb_of, values_of
+from .colours import BRUSHED, DIMMED, colors_of, histogram_of, legend_of, legend_of_names, rgb_of, values_of
 from .drawn_lines import numbers_of
 from .frame import SectionPlane
+from .legend import ColourLegend
 from .pictures import PictureTool
 from .scale import round_ends, set_scale
 from .scene import (
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
     from .state import StudioState
     from .view import StudioView
 
-PLAIN_GRID, BY_LENGTH = "plain", "member length"
+PLAIN_GRID, BY_LENGTH, BY_SECTION = "plain", "member length", "section"
 WHOLE = "none"
 
 
@@ -85,6 +86,10 @@ class GridTab:
         shown = self.view.shown_model()
         tables = {} if shown is None else shown[1]
         self._choices = {one["words"]: one for one in (colorings_of(tables) if shown is not None else [])}
+        if shown is not None and shown[0].truss is not None:
+            sections = sorted(shown[0].truss.sections, key=lambda one: one.area)
+            names = tuple(dict.fromkeys(one.name for one in sections))
+            self._choices[BY_SECTION] = {"kind": "members", "name": "section", "words": BY_SECTION, "names": names}
         kept = self.coloring.value
         self.coloring.options = (PLAIN_GRID, *self._choices)
         best = next(iter(self._choices), PLAIN_GRID)
@@ -102,14 +107,17 @@ class GridTab:
         if column is None:
             self.legend.content = self.bars.content = ""
         else:
-            values, middle = values_of(column), self._choices[self.coloring.value].get("middle")
+            choice = self._choices[self.coloring.value]
+            names, middle = choice.get("names"), choice.get("middle")
+            values = (
+                values_of(column) if names is None else 1.0 + np.array([names.index(each) for each in column.values])
+            )
             _, low, high = colors_of(values, middle)
             self._values = values
             begin, end, step = round_ends(low, high)
             set_scale(self.range, begin, end, step)
             self.range.value = begin, end
             self.view.show_text(self.between, "")
-            self.legend.content = legend_of(self.coloring.value, column.unit, low, high, middle is not None)
         self.draw()
 
     def _slide(self) -> None:
@@ -139,30 +147,35 @@ class GridTab:
         ends = self.view.frame.to_scene(np.stack(cloud.bounds) + cloud.origin)[:, axis]
         return SectionPlane(axis, float(ends[0] + self.at.value * (ends[1] - ends[0])))
 
-    def draw(self) -> None:
-        """Draw the grid or structure."""
+    def draw(self, for_picture: bool = False) -> None:
+        """Draw the grid or structure; for a picture as finely as may be, however long that takes."""
         scene, shown = self.view.scene, self.view.shown_model()
         if shown is None:
             scene.remove(*GRID_PARTS)
-            self.view.legends.show("grid", "")
+            self.view.legends.show("grid", None)
             return
         model, _ = shown
         places = self.view.places(model)
-        legend = ""
+        legend: ColourLegend | None = None
         colors: dict[str, np.ndarray | None] = {"members": None, "nodes": None, "panels": None}
         if self._values is not None:
             choice = self._choices[self.coloring.value]
             middle, unit = choice.get("middle"), getattr(self._column(), "unit", "")
             _, low, high = colors_of(self._values, middle)
             scale_ends = self.view.compare.ends if choice["words"] == BY_LENGTH else None
+            if scale_ends is not None:
+                scale_ends = (scale_ends[0] * self.view.unit_of(model), scale_ends[1] * self.view.unit_of(model))
             most, too_much = choice.get("most", (np.inf, ""))
             if high > most:
                 scale_ends = (min(low, most), most)
             own, *shown_ends = colors_of(self._values, middle, scale_ends)
             own[self._values > most] = rgb_of(too_much) if high > most else 0
             legend = legend_of(self.coloring.value, unit, shown_ends[0], shown_ends[1], middle is not None)
-            legend += legend_of_more(most, too_much) if high > most else ""
-            self.legend.content = legend
+            if high > most:
+                legend = legend.with_mark(rgb_of(too_much), f"more than {most:g}")
+            if "names" in choice:
+                legend = legend_of_names(choice["words"], choice["names"], self._values)
+            self.legend.content = legend.html()
             begin, end = self.range.value
             is_whole = begin <= low and end >= high
             self.bars.content = histogram_of(
@@ -175,7 +188,7 @@ class GridTab:
         section, size = self.section, float(np.linalg.norm(np.diff(places[model.members], axis=1), axis=2).mean())
         of_members = plain_colors(len(model.members)) if colors["members"] is None else colors["members"]
         is_faint = self.view.structure.is_moved or self.view.compare.is_over
-        self.view.legends.show("grid", "" if is_faint else legend)
+        self.view.legends.show("grid", None if is_faint else legend)
         if self.view.structure.is_moved:
             of_members = np.broadcast_to(DIMMED, of_members.shape)
             self.count.content = "grey as built, while the Structure tab shows a displaced shape"
@@ -184,11 +197,11 @@ class GridTab:
             self.count.content = "grey, while Compare draws another design over it"
         ends, of_members = cut(section, places[model.members], of_members)
         lines, bodies = self.members.value and not self.tubes.value, self.members.value and self.tubes.value
-        as_rods = lines and drawn_as_rods(model, len(ends))
+        as_rods = lines and not for_picture and drawn_as_rods(model, len(ends))
         lines = lines and not as_rods
         scene.members(
             "/grid/members", ends if lines else ends[:0], of_members if lines else of_members[:0],
-            FAINT if is_faint else LINE_WIDTH,
+            FAINT if is_faint else LINE_WIDTH, None if for_picture else MOST_DRAWN_LINES,
         )  # fmt: skip
         radius, sides = (ROD_RADIUS, ROD_SIDES) if as_rods else (TUBE_RADIUS, TUBE_SIDES)
         in_space = bodies or as_rods

@@ -17,6 +17,20 @@ if TYPE_CHECKING:
     from .view import StudioView
 
 
+PROGRAMS = {
+    ".3dm": "Rhino", ".3mf": "3D printing", ".compas.json": "COMPAS", ".csv": "spreadsheets", ".dxf": "AutoCAD and others",
+    ".geojson": "QGIS and others", ".glb": "Blender, viewers", ".html": "any browser", ".ifc": "BIM: Revit, Archicad, Tekla",
+    ".inp": "Abaqus", ".json": "ScanTruss", ".karamba.json": "Karamba", ".obj": "Rhino, Blender", ".ply": "MeshLab, CloudCompare",
+    ".png": "a picture", ".py": "OpenSeesPy", ".s2k": "SAP2000", ".saf.xlsx": "SAF: SCIA, RFEM", ".step": "CAD: solids and curves",
+    ".stl": "3D printing", ".stp": "CAD: solids and curves", ".tcl": "OpenSees", ".vtu": "ParaView", ".xlsx": "Excel and others",
+}  # fmt: skip  #: that read what is written, by its suffix
+
+
+def words_of_suffix(suffix: str) -> str:
+    """Return a suffix with the programs that read it."""
+    return f"{suffix}  {PROGRAMS[suffix]}"
+
+
 class OutTab:
     """Downloads."""
 
@@ -26,7 +40,8 @@ class OutTab:
         self.preview = gui.add_markdown(PREVIEW_WORDS, visible=False)
         self.suffix: dict[str, Any] = {}
         for kind in (GRID, STRUCTURE):
-            self.suffix[kind] = gui.add_dropdown(kind, tuple(suffixes_of(kind)), initial_value=".json")
+            known = tuple(map(words_of_suffix, suffixes_of(kind)))
+            self.suffix[kind] = gui.add_dropdown(kind, known, initial_value=words_of_suffix(".json"))
             button = gui.add_button(f"Download the {kind}")
             button.on_click(self._download(partial(self._files, kind)))
         gui.add_button("Download the settings").on_click(self._download(lambda: settings_files(session.state)))
@@ -44,7 +59,7 @@ class OutTab:
         self.command = gui.add_markdown("")
 
     def _files(self, kind: str) -> dict[str, bytes]:
-        return self.view.session.files(kind, self.suffix[kind].value)
+        return self.view.session.files(kind, self.suffix[kind].value.split()[0])
 
     def _download(self, files: Callable[[], dict[str, bytes]]) -> Call:
         return self.view.aside(lambda: self._send(files()))

@@ -11,6 +11,7 @@ from .colours import CLASS_NAMES, MOST_CLASSES, OWN_COLORS, SCAN_COLOURINGS, col
 from .crop_tool import CropTool
 from .opening import EXAMPLES
 from .remove_tool import RemoveTool
+from .scan_parts import UP_AXES
 from .tape import Tape
 
 if TYPE_CHECKING:
@@ -36,6 +37,11 @@ class ScanTab:
             opened = gui.add_button("Open the example")
         self.about = gui.add_markdown("")
         self.unit = gui.add_dropdown("unit", tuple(name or UNKNOWN_UNIT for name in UNITS), initial_value=UNKNOWN_UNIT)
+        self.up = gui.add_dropdown(
+            "up",
+            tuple(UP_AXES),
+            hint="axis of the file that points up: of a scan that lies on its side, y or x; what was placed goes",
+        )
         self.draws = gui.add_checkbox("draw scan", True)
         self.coloring = gui.add_dropdown("colour", SCAN_COLOURINGS)
         with gui.add_folder("Crop", expand_by_default=False):
@@ -53,6 +59,7 @@ class ScanTab:
         by_path.on_click(step(lambda: session.open_path(self.path.value)))
         opened.on_click(step(lambda: session.open_example(self.example.value)))
         self.unit.on_update(step(lambda: session.set_unit("" if self.unit.value == UNKNOWN_UNIT else self.unit.value)))
+        self.up.on_update(step(lambda: session.turn(self.up.value)))
         self._is_set = False  # whether a person has said if the scan is drawn
         self.draws.on_update(step(self._set_drawn))
         self.coloring.on_update(step(self.draw))
@@ -70,6 +77,7 @@ class ScanTab:
             of_all = f" of {whole:,}" if whole != len(cloud.points) else ""
             self.about.content = f"**{cloud.name or 'scan'}**: {len(cloud.points):,}{of_all} points, {cloud.extent:.4g}{unit} long{saved}"
             self.unit.value = cloud.unit or UNKNOWN_UNIT
+        self.up.value = "z" if state.whole is None else state.whole.up
         if before is None or before.whole is not state.whole or before.settings.classes != state.settings.classes:
             self._fill_classes(state)
         if before is None or before.whole is not state.whole:
@@ -113,6 +121,6 @@ class ScanTab:
         state = self.view.session.state
         if state.cloud is None or not self.draws.value:
             self.view.scene.remove_scan()
-            self.view.legends.show("scan", "")
+            self.view.legends.show("scan", None)
             return
         self.view.legends.show("scan", self.view.scene.scan(state, self.coloring.value, self.view.look.section))

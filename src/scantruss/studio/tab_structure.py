@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError
+from ..structure.build import scale_of
 from ..structure.groups import WAYS_TO_GROUP
 from ..structure.options import loads_of_words
 from ..structure.report_lines import sizing_lines
@@ -17,12 +18,15 @@ from ..structure.supports import HELD
 from .colours import colors_of, legend_of
 from .compare import structure_figures
 from .frame import DRAWN_EXTENT
-from .layers_tool import LAYER_CHOICES, LayersTool, words_of_depths
+from .layers_tool import LAYER_CHOICES, LayersTool
 from .outputs import PREVIEW_WORDS
 from .page_words import in_words_of_page
+from .picking import nearest_point
 from .scene import barbed, spread
 from .session import STRUCTURE_WORDS
-from .support_places import marks_of, marks_of_grid, switched, words_of_lost
+from .state import DEFAULT_STRUCTURE
+from .structure_words import scale_of_text, text_of_scale, times_of, weight_bars, words_of_asked
+from .support_places import asked_supports, is_untouched, marks_of_grid, switched
 
 if TYPE_CHECKING:
     from .state import StudioState
@@ -37,45 +41,11 @@ ARROW_WIDTH = 2.0  #: of a load [pixel]
 SUPPORT_RADIUS = 0.09  #: of a support that is drawn [scene]
 ANIMATION_SECONDS, FRAME_SECONDS = 6.0, 0.08  #: of a mode that is shown [s]
 SWINGS = 3  #: of a mode while it is shown
+AROUND_CLICK = 0.03  #: of a node that a click means to support [rad]
 AS_BUILT = "as built"
-SUPPORT_MODE = "support"
+SUPPORT_MODE = "place support"
 SIZING = "Sizing and modes"
 FROM_LISTS = ("support_type", "size_by", *LAYER_CHOICES)  #: what is chosen from a list
-
-
-def scale_of_text(text: str) -> float:
-    """Return the number of "0.01" or "1:100"; a ValueError where it is none."""
-    first, colon, second = text.partition(":")
-    number = float(second) if colon else 1.0
-    if not number > 0:
-        raise ValueError
-    return float(first) / number
-
-
-def weight_bars(weights: dict[int, float]) -> str:
-    """Return the mass of a sized structure by the number of its sections as HTML bars."""
-    most = max(weights.values()) or 1.0
-    rows = "".join(
-        f'<tr><td>{count}</td><td style="width:60%"><div style="height:.8em;background:#3b6d8c;width:{100 * mass / most:.1f}%">'
-        f"</div></td><td>{mass:,.0f} kg</td></tr>"
-        for count, mass in sorted(weights.items())
-    )
-    return (
-        f'<table style="font-size:.85em;width:100%;padding:0 .6em"><caption style="text-align:left;padding:0 .6em">mass by'
-        f" the most different sections</caption>{rows}</table>"
-    )
-
-
-def times_of(factor: float) -> str:
-    """Return a factor with three digits, written out."""
-    return f"{float(f'{factor:.3g}'):,.0f}" if factor >= 100 else f"{factor:.3g}"
-
-
-def words_of_asked(state: StudioState) -> str:
-    """Return how the structure that is shown is supported, of what it is made and what it carries."""
-    shown = state.shown_structure
-    layers = f", double layer {words_of_depths(shown)}" if shown.double_layer else ""
-    return f"supports {shown.supports}, {shown.section}, {shown.material}, {','.join(map(str, shown.loads))}{layers}"
 
 
 class StructureTab:
@@ -84,12 +54,16 @@ class StructureTab:
     def __init__(self, view: StudioView, gui: Any) -> None:
         self.view = view
         kept = view.session.state.structure_settings
-        hint = (
-            "corners, boundary, lowest:H, fixed, ends, line:NAME, loop:N, N001, joined by +; or set a click to support"
-        )
+        hint = "corners, boundary, lowest:H, fixed, ends, line:NAME, loop:N, N001, joined by +; or Place by clicks"
         self.preview = gui.add_markdown(PREVIEW_WORDS, visible=False)
         self.words = {"supports": gui.add_text("supports", kept.supports, hint=hint)}
+        by_click = gui.add_button(
+            "Place by clicks",
+            hint="then click on nodes of the grid; the first takes the place of the usual supports, a second click takes it away",
+        )
         self.lost = gui.add_markdown("", visible=False)
+        self._asked: tuple[Any, ...] = ()  # of which the nodes and words that follow are
+        self._held, self._why_none = np.zeros(0, np.int64), ""
         self.words |= {
             "support_type": gui.add_dropdown("held as", tuple(HELD), initial_value=kept.support_type),
             "section": gui.add_text("section", kept.section),
@@ -99,11 +73,18 @@ class StructureTab:
             "material": gui.add_text("material", kept.material),
             "loads": gui.add_text("loads", ",".join(map(str, kept.loads)), hint="self,snow:1kN/m2,wind:0.8kN/m2:-0.7"),
         }
-        self.numbers = {"scale": gui.add_text("scale", f"{kept.scale:g}", hint="of the structure to the grid")}
+        self.metric = gui.add_markdown("", visible=False)
+        self.numbers = {
+            "scale": gui.add_text(
+                "scale", text_of_scale(kept.scale), hint="structure to scan: 1:500 is a 500th, 500:1 as many times as large; or a number"
+            )
+        }  # fmt: skip
         self.folder = gui.add_folder(SIZING, expand_by_default=False)
         with self.folder:
             self.numbers["size"] = gui.add_text(
-                "size", str(kept.size), hint="different sections that are chosen at most; 0: as above"
+                "most sections",
+                str(kept.size),
+                hint="different sections that sizing chooses at most; 0: no sizing, the section above",
             )
             self.words["size_by"] = gui.add_dropdown(
                 "each section for", WAYS_TO_GROUP, initial_value=kept.size_by, hint="what gets a section of its own"
@@ -121,10 +102,11 @@ class StructureTab:
         )
         self.loads, self.supports = gui.add_checkbox("loads", True), gui.add_checkbox("supports", True)
         animate = gui.add_button("Animate")
+        by_click.on_click(view.step(lambda: setattr(view.click, "value", SUPPORT_MODE)))
         run.on_click(view.step(self._run))
         animate.on_click(view.aside(self._animate))
         self.case.on_update(view.step(self._choose))
-        view.modes[SUPPORT_MODE] = lambda origin, ahead: self.support(view.under(origin, ahead))
+        view.modes[SUPPORT_MODE] = self._support_under
         for each in (self.factor, self.loads, self.supports):
             each.on_update(view.step(self.draw))
         for name, each in (self.words | self.numbers | self.layers.fields).items():
@@ -186,16 +168,32 @@ class StructureTab:
             with contextlib.suppress(InputError):
                 if self._value(name) == getattr(asked, name):
                     continue
-            self.view.show_text(each, f"{getattr(asked, name):g}")
+            value = getattr(asked, name)
+            self.view.show_text(each, text_of_scale(value) if name == "scale" else f"{value:g}")
 
     def _show_notes(self, state: StudioState) -> None:
         """Say what a person must know of the grid, the supports and the section before Run is pressed."""
         self.preview.visible = state.is_live
-        lost, size = words_of_lost(state), state.structure_settings.size
-        self.lost.content, self.lost.visible = f"**lost:** {lost}", bool(lost)
+        size, unit = state.structure_settings.size, state.grid.unit if state.grid is not None else ""
+        self.metric.visible = unit not in ("", "m")
+        if self.metric.visible:
+            metres = scale_of(unit, state.structure_settings.scale)
+            self.metric.content = (
+                f"lengths of the structure are in metres: 1 {unit} of the scan is {metres:.6g} m; loads also as 20psf"
+            )
+        self._look_for_supports(state)
+        self.lost.content, self.lost.visible = f"**supports:** {self._why_none}", bool(self._why_none)
         chosen = f"chosen by sizing, at most {size}" if size else ""
         self.sized.content, self.sized.visible = f"the section is {chosen}; see below", bool(size)
         self.folder.label = f"{SIZING} (sections {chosen})" if size else SIZING
+
+    def _support_under(self, origin: np.ndarray, ahead: np.ndarray) -> None:
+        """Hold the node under a ray, or the nearest to what is there."""
+        found, shown = self.view.under(origin, ahead), self.view.shown_model()
+        if shown is not None and (found is None or found[0] != "nodes"):
+            node = nearest_point(self.view.places(shown[0]), origin, ahead, AROUND_CLICK)
+            found = found if node is None else ("nodes", node)
+        self.support(found)
 
     def support(self, found: tuple[str, int] | None) -> None:
         """Hold the node under a click, or no longer."""
@@ -208,17 +206,33 @@ class StructureTab:
                 'that node is of a layer below; click on one of the grid, and say "supports on" inner to hold the last layer'
             )
         mark = known[found[1]]
-        supports = switched(self.words["supports"].value, mark)
+        before = self.words["supports"].value
+        replaces = is_untouched(self.view.session.state) and before == DEFAULT_STRUCTURE.supports
+        supports = mark if replaces else switched(before, mark)
         self.words["supports"].value = supports
         self.view.session.set_structure(supports=supports)
-        self.view.say(f"supports: {supports or 'none'}; press Run")
-        held = [known.index(word) for word in marks_of(supports) if word in known]
-        self._mark_supports(held, "/supports/chosen")
+        instead = f", in place of the usual {before}: type {before}+{mark} for both" if replaces else ""
+        self.view.say(f"supports: {supports or 'none'}{instead}; press Run")
 
-    def _mark_supports(self, nodes: list[int], name: str) -> None:
-        shown = self.view.shown_model()
-        if shown is not None:
-            self.view.scene.balls(name, self.view.places(shown[0])[nodes], SUPPORT_COLOR, SUPPORT_RADIUS)
+    def _look_for_supports(self, state: StudioState) -> None:
+        """Look for the nodes that the next structure is supported at, once for each grid and what is asked."""
+        asked = state.structure_settings
+        key = (state.grid, asked.supports, asked.scale, asked.unit)
+        if self._asked != key:
+            self._asked = key
+            self._held, self._why_none = asked_supports(state)
+
+    def _draw_supports(self, state: StudioState) -> None:
+        """Draw the supports of the structure that is shown; on this tab those that the next one is asked for, as they are typed."""
+        scene, shown = self.view.scene, self.view.shown_model()
+        is_next = state.solution is None or state.is_structure_stale
+        if shown is None or not self.supports.value or (state.solution is None and not self.view.is_open("Structure")):
+            scene.remove("/supports/held")
+            return
+        places = self.view.places(shown[0])
+        held = self._held if is_next else shown[0].supported
+        held = held[self._kept(places)[held]]
+        scene.balls("/supports/held", places[held], SUPPORT_COLOR, SUPPORT_RADIUS)
 
     def fill(self, before: StudioState | None, state: StudioState) -> None:
         """Show the structure of a state."""
@@ -227,6 +241,8 @@ class StructureTab:
         self._show_notes(state)
         self._show_results(state)
         if before is not None and before.solution is state.solution and before.grid is state.grid:
+            if before.structure_settings is not state.structure_settings:
+                self._draw_supports(state)
             return
         weights = state.report.weights if state.report is not None else None
         self.weights.content = weight_bars(weights) if weights else ""
@@ -235,7 +251,6 @@ class StructureTab:
             cases += tuple(result.name for result in state.solution.all_results())
             cases += tuple(self._shapes(state))
         self.case.options = cases
-        self.view.scene.remove("/supports/chosen")
         self._draw(state)
 
     def _show_results(self, state: StudioState) -> None:
@@ -274,29 +289,30 @@ class StructureTab:
         return moved, factor, is_mode
 
     def _draw(self, state: StudioState) -> None:
-        scene, shown, legend = self.view.scene, self.view.shown_model(), ""
+        scene, shown, legend = self.view.scene, self.view.shown_model(), None
+        self._draw_supports(state)
         if shown is None or state.solution is None or shown[0].truss is None:
-            scene.remove("/moved", "/loads", "/supports/held")
-            self.view.legends.show("shape", "")
+            scene.remove("/moved", "/loads")
+            self.view.legends.show("shape", None)
             return
         model, _ = shown
         places = self.view.places(model)
         kept = self._kept(places)
-        held = model.supported if self.supports.value else np.zeros(0, np.int64)
-        held = held[kept[held]]
-        scene.balls("/supports/held", places[held], SUPPORT_COLOR, SUPPORT_RADIUS)
         moved = self._moved(state)
         if moved is None:
             scene.remove("/moved")
         else:
             change, factor, is_mode = moved
-            size = 1e3 * np.linalg.norm(change, axis=1)[model.members].mean(axis=1)
-            colors, low, high = colors_of(size, None)
+            size = np.linalg.norm(change, axis=1)
+            of_members = size[model.members].mean(axis=1)
+            scale_ends = (0.0, float(size.max()) or 1.0) if is_mode else None  # a mode has no size of its own
+            colors, low, high = colors_of(of_members if is_mode else 1e3 * of_members, None, scale_ends)
             drawn = kept[model.members].all(axis=1)
             ends = (places + self._in_scene(change, factor))[model.members[drawn]]
             scene.lines("/moved", ends, colors[drawn], 4.0)
-            if not is_mode:
-                legend = legend_of(f"displacement, drawn {times_of(factor)} times", "mm", low, high, False)
+            legend = legend_of(f"displacement, drawn {times_of(factor)} times", "mm", low, high, False)
+            if is_mode:
+                legend = legend_of(f"{self.case.value}: movement over the greatest", "", 0.0, 1.0, False)
         self.view.legends.show("shape", legend)
         self._draw_loads(state, places)
 

@@ -77,6 +77,8 @@ class Tape:
         unit = f" {state.cloud.unit}" if state.cloud.unit else ""
         length = f"{np.linalg.norm(way):.4g}{unit}"
         scene.lines("/tape", places[None], np.array(TAPE_COLOR, np.uint8), 5.0)
-        scene.api.add_label("/tape length", length, position=tuple(places.mean(axis=0).tolist()))
+        scene.api.add_label(
+            "/tape length", length, position=tuple(places.mean(axis=0).tolist()), anchor="bottom-center"
+        )
         across = ", ".join(f"{name} {part:.4g}" for name, part in zip("xyz", way.tolist(), strict=True))
         self._say(f"**{length}** ({across}; in plan {np.linalg.norm(way[:2]):.4g})")

@@ -45,7 +45,7 @@ class TradeSteps(ScanSteps):
             raise InputError("few different parts are made of a finished grid; press Generate")
         if before.alike is not None:
             raise InputError(
-                f"the {before.alike.parts} of this grid have been made alike; press Generate for a new one"
+                f"the {before.alike.parts} of this grid have been made equal; press Generate for a new one"
             )
         settings = before.settings
 
@@ -94,7 +94,7 @@ class TradeSteps(ScanSteps):
         """
         trade, cloud, turn = self.state.trade, self.cloud, self._turn
         if trade is None or cloud is None or trade.before.settings is None:
-            raise InputError("the trade of this grid is not known yet; press Find the trade")
+            raise InputError("the trade of this grid is not known yet; press Find what fewer cost")
         chosen, settings = trade.with_at_most(number), trade.before.settings
 
         def take(progress: Progress) -> None:

@@ -24,14 +24,18 @@ class TradeTool:
 
     def __init__(self, view: StudioView, gui: Any) -> None:
         self.view = view
-        self.parts = gui.add_dropdown("alike", WHAT_IS_ALIKE, hint="lengths of members, joints or panels")
+        self.parts = gui.add_dropdown("fewer", WHAT_IS_ALIKE, hint="different lengths of members, joints or panels")
         self.tolerance = gui.add_text(
-            "tolerance", "1%", hint="largest misfit over the mean member; of joints that of unit directions"
+            "tolerance",
+            "1%",
+            hint="parts within it of each other are made the same: largest misfit over the mean member; of joints that of unit directions",
         )
         self.mirrored = gui.add_checkbox(
-            "mirror images alike", False, visible=False, hint="as flat panels are that may be turned over"
+            "mirror images equal", False, visible=False, hint="as flat panels are that may be turned over"
         )
-        find = gui.add_button("Find the trade", hint="takes a minute or some, joints and panels longest; Stop ends it")
+        find = gui.add_button(
+            "Find what fewer cost", hint="takes a minute or some, joints and panels longest; Stop ends it"
+        )
         self.curve = gui.add_html("")
         self.number = gui.add_text(NUMBER_FIELD, "", visible=False, hint="lengths or kinds; or click on the curve")
         self.about = gui.add_markdown("", visible=False)
@@ -92,7 +96,7 @@ def words_of_present(trade: Trade, state: StudioState) -> str:
         return f"the grid as it was: {trade.off_scan:.2g} members off the scan; click on the curve to take fewer {what}"
     return (
         f"**{chosen.number} {what}** within {100 * chosen.misfit:.3g} %, as it was within {100 * chosen.plain:.3g} %; nodes moved by"
-        f" {chosen.moved:.2g} members at most, {chosen.off_scan or 0.0:.2g} off the scan; CV {chosen.cv:.4f}"
+        f" {chosen.moved:.2g} members at most, {chosen.off_scan or 0.0:.2g} off the scan; lengths std/mean {chosen.cv:.4f}"
     )
 
 
@@ -108,7 +112,7 @@ def curve_of(trade: Trade, present: int | None) -> str:
          [100 * each.misfit for each in trade.traded], [100 * each.plain for each in trade.traded]),
         ("farthest node off the scan [% of the member]",
          [100 * (each.off_scan or 0.0) for each in trade.traded], [100 * trade.off_scan] * len(numbers)),
-        ("CV of the lengths", [each.cv for each in trade.traded], [trade.before.quality.length_cv] * len(numbers)),
+        ("std/mean of the lengths", [each.cv for each in trade.traded], [trade.before.quality.length_cv] * len(numbers)),
     )  # fmt: skip
     height = len(charts) * (CHART_HEIGHT + CHART_GAP) + 20
     drawn = [_chart(across, k * (CHART_HEIGHT + CHART_GAP), *chart) for k, chart in enumerate(charts)]

@@ -14,6 +14,7 @@ from ..export.model import Model
 from ..export.page_tables import Tables, tables_of
 from ..grid.panels import panel_of_triangles
 from ..structure.build import scale_of
+from .button_rows import ButtonRows
 from .colours import colorings_of_scan
 from .frame import BESIDE_FIRST, DRAWN_EXTENT, ROOM_AROUND, SceneFrame, distance_to_see
 from .head import Head
@@ -42,7 +43,16 @@ PLAN_FAR = 1.3  #: of the camera above a plan, so that all of it is seen [distan
 PANEL_WIDTH, USUAL_WIDTH = 452, 1280  #: of the panel; of a page that has not said its own [pixel]
 LEAST_DRAWING = 0.4  #: of a page that the drawing has beside the panel, which lies over it on narrower ones
 FIRST_SEEN_FROM = np.array([0.8, -1.4, 0.9])  #: direction from which the scan is seen first
-STEP_NAMES = ("Stop", "Undo", "Redo", "See all")
+STEP_BUTTONS = {
+    "Stop": "ends what runs; what was there before is kept",
+    "Undo": "takes back what is said above (Ctrl+Z)",
+    "Redo": "takes the step again that is said above (Ctrl+Y)",
+    "See all": "moves the camera back to where all is seen",
+}  #: and what each does
+TABS = ("Scan", "Design", "Constraints", "Grid", "Compare", "Structure", "Out")
+OPEN_TABS = (
+    "open tabs"  #: label of the field, never seen, in which the page says which tabs are open (`page_script.js`)
+)
 SMALL_PICTURE, PICTURE_WAIT = (
     (8, 8),
     2.0,
@@ -79,30 +89,33 @@ class StudioView(Presses):
             gui.add_html(PANEL_STYLE)
             self.head = Head(gui)
             generate = gui.add_button("Generate", color="blue", hint="with the effort that Design says (Ctrl+Enter)")
-            self.steps = gui.add_button_group(
-                "steps",
-                STEP_NAMES,
-                hint="what undo (Ctrl+Z) and redo (Ctrl+Y) would take is said above; See all moves the camera back",
+            self.rows = ButtonRows(gui)
+            self.steps = self.rows.add("steps", STEP_BUTTONS)
+            self.click = gui.add_dropdown(
+                "click to", (SELECT,), hint="what a click on the drawing does; select again once another tab is opened"
             )
-            self.click = gui.add_dropdown("a click", (SELECT,), hint="what a click on the drawing does")
             self.row = gui.add_markdown("", visible=False)
             self.legends = Legends(gui)
             tabs = gui.add_tab_group()
-            with tabs.add_tab("Scan"):
+            made = {name: tabs.add_tab(name) for name in TABS}
+            self._seen_tabs = {TABS[0]}
+            with made["Scan"]:
                 self.scan = ScanTab(self, gui)
-            with tabs.add_tab("Design"):
+            with made["Design"]:
                 self.design = DesignTab(self, gui)
-            with tabs.add_tab("Constraints"):
+            with made["Constraints"]:
                 self.constraints = ConstraintsTab(self, gui)
-            with tabs.add_tab("Grid"):
+            with made["Grid"]:
                 self.look = GridTab(self, gui)
-            with tabs.add_tab("Compare"):
+            with made["Compare"]:
                 self.compare = CompareTab(self, gui)
-            with tabs.add_tab("Structure"):
+            with made["Structure"]:
                 self.structure = StructureTab(self, gui)
-            with tabs.add_tab("Out"):
+            with made["Out"]:
                 self.files = OutTab(self, gui)
             self.click.options = self.clicks
+            gui.add_html(self.rows.html())
+            gui.add_text(OPEN_TABS, "").on_update(self.chosen(self._open))
             generate.on_click(self.step(session.generate))  # before anybody can click
             self.steps.on_click(self.chosen(self._step))
             self._add_keys(gui)
@@ -129,7 +142,7 @@ class StudioView(Presses):
 
     def _step(self, name: str) -> None:
         session = self.session
-        dict(zip(STEP_NAMES, (session.stop, self.undo, session.redo, self.see_all), strict=True))[name]()
+        dict(zip(STEP_BUTTONS, (session.stop, self.undo, session.redo, self.see_all), strict=True))[name]()
 
     def undo(self) -> None:
         """Drop the last corner of what is being drawn, else take the last step back."""
@@ -145,6 +158,22 @@ class StudioView(Presses):
             ("Generate", "enter", session.generate),
         ):
             gui.add_command(words, hotkey=key, modifier="cmd/ctrl").on_trigger(self.step(step))
+
+    # ---- tabs
+
+    def is_open(self, tab: str) -> bool:
+        """Whether a tab is seen."""
+        return tab in self._seen_tabs
+
+    def _open(self, words: str) -> None:
+        """Let a click select again, for what it did, as a crop that is being drawn, belongs to the tab that was left."""
+        seen = set(words.split(",")) & set(TABS)
+        if seen != self._seen_tabs:
+            self._seen_tabs = seen
+            self.click.value = SELECT
+            if "Scan" not in seen:
+                self.scan.crop.put_away()
+            self.structure.draw()
 
     # ---- clicks
 
@@ -229,10 +258,13 @@ class StudioView(Presses):
         asked = state.shown_structure
         return scale_of(state.settings.unit or (state.cloud.unit if state.cloud else "") or asked.unit, asked.scale)
 
+    def unit_of(self, model: Model) -> float:
+        """Return one scan unit in the unit of a model: a structure is in metres."""
+        return 1.0 if model.truss is None else self.metres()
+
     def places(self, model: Model) -> np.ndarray:
         """Return where the nodes of a model are drawn (V, 3)."""
-        nodes = model.nodes if model.truss is None else model.nodes / self.metres()
-        return self.frame.to_scene(nodes)
+        return self.frame.to_scene(model.nodes / self.unit_of(model))
 
     def fly(self, where: np.ndarray, reach: float) -> None:
         """Move the camera to a place of the scene, as far off as `reach`."""
@@ -259,6 +291,24 @@ class StudioView(Presses):
         corners = self.frame.corners
         aside = np.array([BESIDE_FIRST * DRAWN_EXTENT * (designs - 1), 0.0, 0.0])
         self.see(np.concatenate([corners, corners + aside]))
+
+    def _look_again(self, before: StudioState | None, state: StudioState) -> None:
+        """Look at another scan or crop as a whole; where only some points went or came, as it was looked at before."""
+        assert state.cloud is not None
+        if (
+            before is None
+            or before.cloud is None
+            or before.opened != state.opened
+            or before.settings.crop != state.settings.crop
+            or before.cloud.unit != state.cloud.unit
+            or (before.whole is not None and state.whole is not None and before.whole.up != state.whole.up)
+        ):
+            self.overview()
+            return
+        known, now, camera = SceneFrame.of(before.cloud), SceneFrame.of(state.cloud), self.client.camera
+        seen = now.to_scene(known.from_scene(np.array([camera.position, camera.look_at])))
+        with self.client.atomic():
+            camera.position, camera.look_at = tuple(seen[0].tolist()), tuple(seen[1].tolist())
 
     def see_all(self) -> None:
         """Move the camera back to where all that is drawn is seen."""
@@ -289,4 +339,4 @@ class StudioView(Presses):
             for tab in self.tabs:
                 tab.fill(before, state)
             if state.cloud is not None and (before is None or before.cloud is not state.cloud):
-                self.overview()
+                self._look_again(before, state)
