@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -239,55 +239,73 @@ def reach_tips_of(
 
     Each turn finds those that the grid misses by then. In the end the grid is searched again.
     """
-    mesh, of_scan = candidate.mesh, (candidate.front, samples, constraints, candidate.settings)
-    given_up: list[np.ndarray] = []
+    search = TipSearch(candidate, samples, boundary, constraints, settings)
+    mesh, reached = candidate.mesh, False
+    for _ in range(TURNS_OF_TIPS if settings.method == "default" else 0):
+        kept, cost = mesh.copied(), candidate.cost_of_tips
+        now = search.reach(find_tips(mesh, candidate.front, samples, search.given_up))
+        if now is None or not search.is_taken(now, cost):
+            mesh.restore(kept)
+            break
+        reached = True
+    if reached and settings.effort != "quick":
+        kept, cost = mesh.copied(), candidate.cost_of_tips
+        if not search.is_taken(search.judged(searched_again(mesh, *search.of_scan)), cost):
+            mesh.restore(kept)
 
-    def judged(grid: Grid) -> Judged:
-        return judge(finish_rings(grid, boundary).replace(settings=settings), samples, boundary, settings)
 
-    def reach(tips: Sequence[np.ndarray]) -> Judged | None:
-        """Put nodes on the tips where nothing goes wrong, and give up the others; the grid then, None where it is as before.
+@dataclass(eq=False)
+class TipSearch:
+    """Nodes on their way to the tips of a scan."""
+
+    candidate: Candidate
+    samples: SurfaceSamples
+    boundary: Boundary
+    constraints: Constraints
+    settings: Settings
+    given_up: list[np.ndarray] = field(default_factory=list)  #: tips (3,) that no node can be put on
+
+    @property
+    def of_scan(self) -> tuple[Grid, SurfaceSamples, Constraints, Settings]:
+        """What a mesh needs to be put down."""
+        return self.candidate.front, self.samples, self.constraints, self.candidate.settings
+
+    def judged(self, grid: Grid) -> Judged:
+        """Return a grid that was put down, finished and judged."""
+        finished = finish_rings(grid, self.boundary).replace(settings=self.settings)
+        return judge(finished, self.samples, self.boundary, self.settings)
+
+    def reach(self, tips: Sequence[np.ndarray]) -> Judged | None:
+        """Put nodes on the tips (3,) where nothing goes wrong, and give up the others; the grid then, None where it is as before.
 
         Tips near a fault are tried one by one. Ends: each call has fewer tips than the one that made it.
         """
+        mesh = self.candidate.mesh
         kept = mesh.copied()
         if put_on_tips(mesh, tips):
-            now = judged(put_down(mesh, *of_scan))
+            now = self.judged(put_down(mesh, *self.of_scan))
             if misses_at_most(now.checked_grid, MOST_MISSED):
                 return now
             mesh.restore(kept)
             if len(tips) > 1:
-                faults = [np.array(fault.where) - samples.origin for fault in now.certificate.faults if fault.where]
+                faults = [np.array(each.where) - self.samples.origin for each in now.certificate.faults if each.where]
                 harmless, suspects = suspects_apart(tips, faults, mesh.length)
-                found = reach(harmless)
+                found = self.reach(harmless)
                 for tip in suspects:
-                    found = reach([tip]) or found
+                    found = self.reach([tip]) or found
                 return found
-        given_up.extend(tips)
+        self.given_up.extend(tips)
         return None
 
-    def is_taken(now: Judged, cost: float) -> bool:
+    def is_taken(self, now: Judged, cost: float) -> bool:
         """Take the grid that the mesh has become where it passes as far and is better than one of some cost."""
-        before = candidate.judged
+        candidate, before = self.candidate, self.candidate.judged
         assert before is not None
         candidate.take(now)
         better = misses_at_most(grid_of(candidate), MOST_MISSED) and candidate.cost_of_tips < cost
         if not better:
             candidate.take(before)
         return better
-
-    reached = False
-    for _ in range(TURNS_OF_TIPS if settings.method == "default" else 0):
-        kept, cost = mesh.copied(), candidate.cost_of_tips
-        now = reach(find_tips(mesh, candidate.front, samples, given_up))
-        if now is None or not is_taken(now, cost):
-            mesh.restore(kept)
-            break
-        reached = True
-    if reached and settings.effort != "quick":
-        kept, cost = mesh.copied(), candidate.cost_of_tips
-        if not is_taken(judged(searched_again(mesh, *of_scan)), cost):
-            mesh.restore(kept)
 
 
 def chosen(passed: Sequence[Candidate]) -> Candidate:
