@@ -108,7 +108,7 @@ def test_a_refused_length_comes_with_one_that_passes(
             raise st.FrontError("the front cannot close")
         return judge(grid, samples, boundary, settings)
 
-    monkeypatch.setattr("scantruss.candidates.judge", fails_there)
+    monkeypatch.setattr("scantruss.improve.candidate.judge", fails_there)
     monkeypatch.setattr("scantruss.attempts.MOST_RUNS", 3)  # there is no use in more where all fail
     words = ["grid", "limpet.xyz", "a.json", "--effort", "quick", "--length"]
     assert main([*words, str(failing)]) == 2

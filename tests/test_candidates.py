@@ -244,7 +244,7 @@ def test_fronts_that_fail_their_check_are_left_out_and_the_fault_of_the_best_is_
         return judge(grid, *others)
 
     monkeypatch.setattr(parallel, "processors", lambda: 1)
-    monkeypatch.setattr(candidates, "judge", check)
+    monkeypatch.setattr("scantruss.improve.candidate.judge", check)
     grid = st.optimize_fronts(fronts, *steps, settings)
     assert len(refused) == 3 and grid.topology.manifold
 
@@ -253,7 +253,7 @@ def test_fronts_that_fail_their_check_are_left_out_and_the_fault_of_the_best_is_
         raise FrontError(f"fault {len(refused)}")
 
     refused.clear()
-    monkeypatch.setattr(candidates, "judge", never)
+    monkeypatch.setattr("scantruss.improve.candidate.judge", never)
     with pytest.raises(FrontError, match="fault 1"):
         st.optimize_fronts(fronts, *steps, settings)
 
@@ -272,7 +272,7 @@ def test_best_is_no_worse_than_normal_and_takes_part_only_where_that_passes(
             raise FrontError(f"fault of {fails}")
         return judge(grid, *others)
 
-    monkeypatch.setattr(candidates, "judge", check)
+    monkeypatch.setattr("scantruss.improve.candidate.judge", check)
     if fails == "normal":
         with pytest.raises(FrontError, match="fault of normal"):
             st.optimize_fronts(fronts, *steps, settings)

@@ -13,7 +13,7 @@ from shapes import make
 from steps import steps_of
 from typed import known
 
-from scantruss import Grid, PointCloud, Settings, candidates, grid_from_points
+from scantruss import Grid, PointCloud, Settings, grid_from_points
 from scantruss.check.certify import Judged, judge
 from scantruss.constraints.find import wanted_ridges
 from scantruss.constraints.fold_tracing import Tracer, is_even, parts_of
@@ -138,7 +138,7 @@ def test_a_grid_that_fails_with_its_ridges_is_made_without(monkeypatch: pytest.M
             raise FrontError("no", grid)
         return judge(grid, *others)
 
-    monkeypatch.setattr(candidates, "judge", refuse_lines)
+    monkeypatch.setattr("scantruss.improve.candidate.judge", refuse_lines)
     grid = grid_from_points(shape.points, Settings(length=shape.length))
     assert len(grid.lines) == 0 and known(grid.settings).ridge_angle == 0.0
 

@@ -12,9 +12,9 @@ from surfaces import distance_to_triangles
 from typed import known
 
 import scantruss as st
-from scantruss import candidates
 from scantruss.front.advance import advance_front
 from scantruss.front.orientation_field import orientation_fields
+from scantruss.improve import tip_search
 from scantruss.improve.optimize import improve_first, improve_last
 from scantruss.improve.tips import (
     FARTHEST_TIP,
@@ -130,8 +130,8 @@ def test_a_tip_that_spoils_the_grid_is_given_up_and_the_others_are_reached(monke
             mesh.net.kind[free[0]] = AT_REST
         return placed
 
-    monkeypatch.setattr("scantruss.candidates.find_tips", first_tips)
-    monkeypatch.setattr("scantruss.candidates.put_on_tips", spoil)
+    monkeypatch.setattr("scantruss.improve.tip_search.find_tips", first_tips)
+    monkeypatch.setattr("scantruss.improve.tip_search.put_on_tips", spoil)
     grid = st.grid_from_points(points, settings)
     assert known(grid.certificate).passed
     assert any(spoilt)
@@ -146,7 +146,7 @@ def test_a_tip_that_spoils_the_grid_is_given_up_and_the_others_are_reached(monke
 def test_a_grid_reaches_the_end_of_an_ear(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     points, settings = eared_ball(seed), st.Settings(length=1.0)
     grid = st.grid_from_points(points, settings)
-    monkeypatch.setattr(candidates, "TURNS_OF_TIPS", 0)
+    monkeypatch.setattr(tip_search, "TURNS_OF_TIPS", 0)
     without = st.grid_from_points(points, settings)
     one, other = known(grid.certificate), known(without.certificate)
     ear = points[points[:, 0] > BALL + 0.5] - grid.origin
@@ -160,7 +160,7 @@ def test_a_grid_reaches_the_end_of_an_ear(seed: int, monkeypatch: pytest.MonkeyP
 def test_a_ball_has_no_tips(monkeypatch: pytest.MonkeyPatch) -> None:
     points, settings = BALL * on_ball(6000, np.random.default_rng(3)), st.Settings(length=1.0)
     grid = st.grid_from_points(points, settings)
-    monkeypatch.setattr(candidates, "TURNS_OF_TIPS", 0)
+    monkeypatch.setattr(tip_search, "TURNS_OF_TIPS", 0)
     without = st.grid_from_points(points, settings)
     assert (grid.nodes == without.nodes).all()
     assert (grid.triangles == without.triangles).all()

@@ -1,0 +1,99 @@
+"""Turns in which nodes are put on the tips of a scan, as long as nothing else goes wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from .candidate import Candidate, grid_of, judged, misses_at_most
+from .optimize import put_down, searched_again
+from .tips import find_tips, put_on_tips, suspects_apart
+
+if TYPE_CHECKING:
+    from ..boundary.find import Boundary
+    from ..check.certify import Judged
+    from ..constraints.find import Constraints
+    from ..grid.grid import Grid
+    from ..settings import Settings
+    from ..surface.samples import SurfaceSamples
+
+TURNS_OF_TIPS = 5  # times that nodes are put on tips
+MOST_MISSED = 0.2  # largest share of the scan that a grid may miss where nodes are put on tips
+
+
+def reach_tips_of(
+    candidate: Candidate, samples: SurfaceSamples, boundary: Boundary, constraints: Constraints, settings: Settings
+) -> None:
+    """Put nodes on the tips of the scan that a grid misses, as long as it is better for it and nothing else goes wrong.
+
+    Each turn finds those that the grid misses by then. In the end the grid is searched again.
+    """
+    search = TipSearch(candidate, samples, boundary, constraints, settings)
+    mesh, reached = candidate.mesh, False
+    for _ in range(TURNS_OF_TIPS if settings.method == "default" else 0):
+        kept, cost = mesh.copied(), candidate.cost_of_tips
+        now = search.reach(find_tips(mesh, candidate.front, samples, search.given_up))
+        if now is None or not search.is_taken(now, cost):
+            mesh.restore(kept)
+            break
+        reached = True
+    if reached and settings.effort != "quick":
+        kept, cost = mesh.copied(), candidate.cost_of_tips
+        if not search.is_taken(search.judged(searched_again(mesh, *search.of_scan)), cost):
+            mesh.restore(kept)
+
+
+@dataclass(eq=False)
+class TipSearch:
+    """Nodes on their way to the tips of a scan."""
+
+    candidate: Candidate
+    samples: SurfaceSamples
+    boundary: Boundary
+    constraints: Constraints
+    settings: Settings
+    given_up: list[np.ndarray] = field(default_factory=list)  #: tips (3,) that no node can be put on
+
+    @property
+    def of_scan(self) -> tuple[Grid, SurfaceSamples, Constraints, Settings]:
+        """What a mesh needs to be put down."""
+        return self.candidate.front, self.samples, self.constraints, self.candidate.settings
+
+    def judged(self, grid: Grid) -> Judged:
+        """Return a grid that was put down, judged."""
+        return judged(grid, self.samples, self.boundary, self.settings)
+
+    def reach(self, tips: Sequence[np.ndarray]) -> Judged | None:
+        """Put nodes on the tips (3,) where nothing goes wrong, and give up the others; the grid then, None where it is as before.
+
+        Tips near a fault are tried one by one. Ends: each call has fewer tips than the one that made it.
+        """
+        mesh = self.candidate.mesh
+        kept = mesh.copied()
+        if put_on_tips(mesh, tips):
+            now = self.judged(put_down(mesh, *self.of_scan))
+            if misses_at_most(now.checked_grid, MOST_MISSED):
+                return now
+            mesh.restore(kept)
+            if len(tips) > 1:
+                faults = [np.array(each.where) - self.samples.origin for each in now.certificate.faults if each.where]
+                harmless, suspects = suspects_apart(tips, faults, mesh.length)
+                found = self.reach(harmless)
+                for tip in suspects:
+                    found = self.reach([tip]) or found
+                return found
+        self.given_up.extend(tips)
+        return None
+
+    def is_taken(self, now: Judged, cost: float) -> bool:
+        """Take the grid that the mesh has become where it passes as far and is better than one of some cost."""
+        candidate, before = self.candidate, self.candidate.judged
+        assert before is not None
+        candidate.take(now)
+        better = misses_at_most(grid_of(candidate), MOST_MISSED) and candidate.cost_of_tips < cost
+        if not better:
+            candidate.take(before)
+        return better
