@@ -28,14 +28,14 @@ def free_port() -> int:
 
 @contextmanager
 def served_session(session: Session) -> Iterator[tuple[str, Any]]:
-    """Serve a session; give the address of its page and the server."""
+    """Serve a session; give the address of its page and the pages, which stop the server."""
     server, _ = start_server("127.0.0.1", free_port())
+    pages = serve_browsers(server, Browsers(session))
     try:
-        serve_browsers(server, Browsers(session))
-        yield f"http://127.0.0.1:{server.get_port()}/", server
+        yield f"http://127.0.0.1:{server.get_port()}/", pages
     finally:
         session.stop()
-        server.stop()
+        pages.stop()
 
 
 def write_dome(folder: Path, rows: int = 60) -> Path:
@@ -47,13 +47,13 @@ def write_dome(folder: Path, rows: int = 60) -> Path:
 
 @contextmanager
 def served_dome(folder: Path) -> Iterator[tuple[str, Session, Any]]:
-    """Serve a studio with a shallow dome in metres; give its address, its session and the server."""
+    """Serve a studio with a shallow dome in metres; give its address, its session and its pages."""
     pytest.importorskip("viser", reason="viser is not installed")
     session = Session(folder / "dome.scantruss")
     session.open(write_dome(folder))
     session.set_unit("m")
-    with served_session(session) as (address, server):
-        yield address, session, server
+    with served_session(session) as (address, pages):
+        yield address, session, pages
 
 
 def until(holds: Callable[[], bool], seconds: float = 30.0) -> bool:

@@ -121,11 +121,11 @@ def test_presses_that_come_at_once_all_count(served: tuple[str, Session, Any]) -
 
 def test_what_was_typed_counts_for_a_press_that_overtakes_it(served: tuple[str, Session, Any]) -> None:
     """Viser calls functions side by side: what a press calls may come before what the text called."""
-    address, session, server = served
+    address, session, pages = served
     with open_page(address) as (page, errors):
         page.wait_for_selector("text=Generate")
         assert session.worker.wait(60)
-        (client,) = server.get_clients().values()
+        (client,) = pages.server.get_clients().values()
         pool = client.gui._thread_executor
         submit = pool.submit
 

@@ -1,7 +1,10 @@
 """What a person meets on a walk through the page of the studio: what stays in sight, what is kept as set, what is marked as old."""
 
+import gc
 import io
+from itertools import count
 from pathlib import Path
+from threading import Event, Thread
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -148,18 +151,18 @@ def test_undo_drops_the_last_corner_of_a_polygon_and_one_that_crosses_itself_is_
 
 
 def test_a_page_says_when_the_server_has_gone_and_goes_on_when_it_is_back(tmp_path: Path) -> None:
-    with served_dome(tmp_path) as (address, session, server), open_page(address) as (page, errors):
+    with served_dome(tmp_path) as (address, session, pages), open_page(address) as (page, errors):
         page.set_viewport_size(SMALL)
         ready(page, session)
         tab(page, "Design")
         with page.expect_response("**/alive"):
             pass
         assert page.locator("text=Connection lost").count() == 0
-        server.stop()
+        pages.stop()
         page.wait_for_selector("text=Connection lost", timeout=15_000)
-        again, _ = start_server("127.0.0.1", int(urlsplit(address).port or 0))
+        server, _ = start_server("127.0.0.1", int(urlsplit(address).port or 0))
+        again = serve_browsers(server, Browsers(session))
         try:
-            serve_browsers(again, Browsers(session))
             page.wait_for_selector("text=Connection lost", state="detached", timeout=30_000)
             page.wait_for_selector("text=dome.scantruss")
             tab(page, "Design")
@@ -169,4 +172,27 @@ def test_a_page_says_when_the_server_has_gone_and_goes_on_when_it_is_back(tmp_pa
             assert until(lambda: session.settings.length > length)
         finally:
             again.stop()
+        assert errors == []
+
+
+def test_a_page_is_not_written_to_once_its_server_has_stopped(tmp_path: Path) -> None:
+    """A slider that is set calls what listens to it, of which viser then waits for nothing on a server that is no more."""
+    with served_dome(tmp_path) as (address, session, pages), open_page(address) as (page, errors):
+        page.set_viewport_size(SMALL)
+        ready(page, session)
+        length, ended = session.settings.length, Event()
+
+        def change() -> None:
+            for k in count():  # ends: with the test
+                session.set_length(length * (1.0 + 0.001 * (k % 100)))
+                if ended.is_set():
+                    return
+
+        changing = Thread(target=change)
+        changing.start()
+        page.wait_for_timeout(300)
+        pages.stop()
+        ended.set()
+        changing.join()
+        gc.collect()  # says what was never awaited
         assert errors == []

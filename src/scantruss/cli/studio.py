@@ -63,8 +63,8 @@ def studio(values: Namespace) -> None:
         session.show_quick()
     browsers = Browsers(session)
     server, guard = start_server(values.host, values.port)
+    pages = serve_browsers(server, browsers)
     try:
-        serve_browsers(server, browsers)
         address = address_to_open(values.host, server.get_port(), guard.token)
         saved = f"saved as {project} after each step" if project is not None else "saved here as soon as a scan is open"
         print_lines([f"studio at {address}", f"the project is {saved}; end with Ctrl-C"])
@@ -75,7 +75,7 @@ def studio(values: Namespace) -> None:
             time.sleep(3600.0)
     finally:
         browsers.stop()
-        server.stop()
+        pages.stop()
 
 
 def project_of(values: Namespace) -> Path | None:

@@ -33,7 +33,7 @@ class InOrder:
 
     def close(self) -> None:
         """Take what has come, and nothing more."""
-        self._thread.shutdown(wait=False)
+        self._thread.shutdown()
 
 
 def _take(take: Callable[..., None], *what: Any) -> None:

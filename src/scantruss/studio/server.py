@@ -19,6 +19,7 @@ from ..errors import InputError, how_to_install
 
 if TYPE_CHECKING:
     from .browsers import Browsers
+    from .view import StudioView
 
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 SOMEWHERE = {
@@ -220,39 +221,60 @@ def _own_address(everywhere: str) -> str:
             return socket.gethostname()
 
 
-def serve_browsers(server: Any, browsers: Browsers) -> None:
+def serve_browsers(server: Any, browsers: Browsers) -> Pages:
     """Give each page the session of its browser, which a key in the storage of the browser tells."""
-    from .view import StudioView
+    pages = Pages(server, browsers)
+    server.on_client_connect(pages.begin)
+    server.on_client_disconnect(pages.end)
+    return pages
 
-    views: dict[int, tuple[str, StudioView]] = {}
 
-    def begin(client: Any) -> None:
+class Pages:
+    """The open pages of a server."""
+
+    def __init__(self, server: Any, browsers: Browsers) -> None:
+        self.server, self._browsers = server, browsers
+        self._views: dict[int, tuple[str, StudioView]] = {}
+        self._stopping = False
+
+    def begin(self, client: Any) -> None:
+        """Make the page of a browser that has come."""
+        from .view import StudioView
+
         try:
             known = client.local_storage.get_item(BROWSER_KEY, timeout=STORAGE_PATIENCE)
         except (RuntimeError, TimeoutError):  # closed already, or a browser that keeps nothing
             known = None
         try:
-            key, session = browsers.join(known)
+            key, session = self._browsers.join(known)
         except InputError as error:
             client.gui.add_markdown(f"**Refused:** {error}")
             return
         try:
             client.local_storage.set_item(BROWSER_KEY, key)
-            views[client.client_id] = (key, StudioView(session, client))
+            self._views[client.client_id] = (key, StudioView(session, client))
         except BaseException:
-            browsers.leave(key)
+            self._browsers.leave(key)
             raise
-        if client.client_id not in server.get_clients():  # closed while its page was being made
-            end(client)
+        if self._stopping or client.client_id not in self.server.get_clients():  # closed while its page was being made
+            self.end(client)
 
-    def end(client: Any) -> None:
-        key, view = views.pop(client.client_id, ("", None))
+    def end(self, client: Any) -> None:
+        """Let go of the page of a browser that has left."""
+        self._close(client.client_id)
+
+    def stop(self) -> None:
+        """Let go of all pages and stop the server: no page writes to a server that is no more."""
+        self._stopping = True
+        for client in list(self._views):
+            self._close(client)
+        self.server.stop()
+
+    def _close(self, client: int) -> None:
+        key, view = self._views.pop(client, ("", None))
         if view is not None:
             view.close()
-            browsers.leave(key)
-
-    server.on_client_connect(begin)
-    server.on_client_disconnect(end)
+            self._browsers.leave(key)
 
 
 def _no_tunnel(*_: Any, **__: Any) -> None:

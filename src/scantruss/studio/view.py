@@ -72,6 +72,7 @@ class StudioView(Presses):
             whole - PANEL_WIDTH, LEAST_DRAWING * whole
         )  # of the drawing once the panel is beside it [pixel]
         self._lock = RLock()
+        self._closed = False
         self._shown: StudioState | None = None
         self._refused = session.message
         self._model: tuple[StudioState, Model, Tables] | None = None
@@ -130,9 +131,11 @@ class StudioView(Presses):
             self.client.get_render(*SMALL_PICTURE, timeout=PICTURE_WAIT)
 
     def close(self) -> None:
-        """Stop listening to the session."""
+        """Stop listening to the session; when this returns, nothing is written to the page any more."""
         self._end()
         super().close()
+        with self._lock:  # after what is being shown
+            self._closed = True
 
     # ---- controls
 
@@ -327,6 +330,8 @@ class StudioView(Presses):
         """Show what the session holds; called from any thread."""
         session = self.session
         with self._lock, self.client.atomic():
+            if self._closed:
+                return
             state = session.state
             self.head.show(session)
             if session.message and session.message != self._refused:  # the panel may have been scrolled
