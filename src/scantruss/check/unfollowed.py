@@ -48,12 +48,10 @@ def unfollowed_parts(
     if not len(which):
         return []
     part = points_together(samples.scan[which], np.full(len(which), side))
-    parts = [which[part == number] for number in np.argsort(-np.bincount(part), kind="stable").tolist()]
-    long = [
-        own
-        for own in parts
-        if len(own) >= WARN_SHARE * len(samples.scan) and _size(own, samples) >= LONG * members[own].mean()
-    ]
+    points = np.bincount(part)
+    large = np.flatnonzero(points >= WARN_SHARE * len(samples.scan))
+    parts = [which[part == number] for number in large[np.argsort(-points[large], kind="stable")].tolist()]
+    long = [own for own in parts if _size(own, samples) >= LONG * members[own].mean()]
     return [_warning(grid, samples, found, long)] if long else []
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 LONGEST_BRIDGE = 4.0  # longest gap over which the ends of two ridges are joined [member lengths]
 COSINE_TO_OTHER_END = 0.94  # least cosine of the angle between such an end and the way to the other
@@ -141,31 +142,37 @@ def _direction(line: np.ndarray, places: int) -> np.ndarray:
 
 def _bridged(ridges: list[Ridge], length: float) -> list[Ridge]:
     """Join ridges whose ends face each other, over the smallest gap first; each turn leaves one ridge fewer."""
-    found = list(ridges)
-    while (pair := _facing([ridge.places for ridge in found], length)) is not None:
-        one, two = pair
-        first, second = found[one.line], found[two.line]
-        before = first.places if one.at == -1 else first.places[::-1]
-        after = second.places if two.at == 0 else second.places[::-1]
-        rest = [ridge for k, ridge in enumerate(found) if k not in (one.line, two.line)]
-        found = [*rest, Ridge(np.concatenate([before, after]), first.sharp or second.sharp)]
+    found, ends = list(ridges), [end for ridge in ridges for end in _ends_of(ridge)]
+    while (pair := _facing(ends, length)) is not None:
+        (i, one), (j, two) = ((number // 2, ends[number]) for number in pair)
+        before = found[i].places if one.at == -1 else found[i].places[::-1]
+        after = found[j].places if two.at == 0 else found[j].places[::-1]
+        joined = Ridge(np.concatenate([before, after]), found[i].sharp or found[j].sharp)
+        found = [*(ridge for k, ridge in enumerate(found) if k not in (i, j)), joined]
+        ends = [*(end for k, end in enumerate(ends) if k // 2 not in (i, j)), *_ends_of(joined)]
     return found
 
 
-def _facing(lines: list[np.ndarray], length: float) -> tuple[End, End] | None:
-    """Two ends that face each other over the smallest gap."""
-    best, pair = LONGEST_BRIDGE * length, None
-    ends = [end_of(line, i, at) for i, line in enumerate(lines) for at in (0, -1)]
-    for k, one in enumerate(ends):
-        for two in ends[k + 1 :]:
-            gap = two.place - one.place
-            size = float(np.linalg.norm(gap))
-            straight = min(gap @ one.ahead, -(gap @ two.ahead)) > COSINE_TO_OTHER_END * size or (
-                size < TOUCHING_GAP * length and two.ahead @ one.ahead < -COSINE_TO_OTHER_END
-            )
-            if one.line != two.line and size < best and straight:
-                best, pair = size, (one, two)
-    return pair
+def _ends_of(ridge: Ridge) -> tuple[End, End]:
+    """Return the first and the last end of a ridge."""
+    return end_of(ridge.places, 0, 0), end_of(ridge.places, 0, -1)
+
+
+def _facing(ends: list[End], length: float) -> tuple[int, int] | None:
+    """Return the numbers of two ends of two ridges that face each other over the smallest gap, of the two ends of each in turn."""
+    places, ahead = (np.array([getattr(end, name) for end in ends]).reshape(-1, 3) for name in ("place", "ahead"))
+    near = cKDTree(places).query_pairs(LONGEST_BRIDGE * length, output_type="ndarray")
+    near = near[near[:, 0] // 2 != near[:, 1] // 2]
+    one, two = near[np.lexsort(near.T[::-1])].T
+    gap = places[two] - places[one]
+    size = np.linalg.norm(gap, axis=1)
+    least = np.minimum((gap * ahead[one]).sum(axis=1), -(gap * ahead[two]).sum(axis=1))
+    opposite = (ahead[two] * ahead[one]).sum(axis=1) < -COSINE_TO_OTHER_END
+    faces = (least > COSINE_TO_OTHER_END * size) | ((size < TOUCHING_GAP * length) & opposite)
+    if not faces.any():
+        return None
+    best = int(np.where(faces, size, np.inf).argmin())
+    return int(one[best]), int(two[best])
 
 
 def _corners(ends: list[End], length: float) -> dict[tuple[int, int], np.ndarray]:
