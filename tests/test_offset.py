@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.distance import pdist
 from shapes import make
 from small_clouds import sheet
 from steps import steps_of
@@ -218,6 +219,18 @@ def test_a_notch_is_a_corner_where_points_would_lie_in_it(density: float, kept: 
     at, _ = find_corners(curve, settings)
     corners = module.offset_curve(curve, SamplingBias(0.03, density), settings, plane)[1]
     assert len(at) > 4 and (len(corners) == 4 if not kept else len(corners) == len(at))
+
+
+def test_no_two_corners_are_so_near_that_the_member_between_them_is_too_short() -> None:
+    """The certificate asks for half the desired length, and nodes are put on the scan after that: of such corners one counts."""
+    nearest = []
+    for seed in range(100):
+        rng = np.random.default_rng(seed)
+        turn, far = np.sort(rng.uniform(0.0, 2.0 * np.pi, 25)), rng.uniform(3.0, 5.0, 25)
+        outline = np.column_stack([far * np.cos(turn), far * np.sin(turn), rng.uniform(-1.0, 1.0, 25)])
+        _, places = find_corners(resample(outline, CURVE_STEP), st.Settings(length=1.0))
+        nearest.append(pdist(places).min() if len(places) > 1 else np.inf)
+    assert min(nearest) > 0.6
 
 
 def test_a_bay_is_as_large_as_it_is(plane: Surface) -> None:

@@ -16,7 +16,10 @@ CORNER_REACH = 2.0  # length of the curve on each side from which the place of a
 SHORTEST_SIDE = 0.6  # shortest length of the curve on each side, where another corner is near [member lengths]
 # start and end of the part of the curve on each side that shows where a corner may be [member lengths]
 SIGHT_ALONG_CURVE = (0.1, 0.8)
-CORNER_SPACING = 0.5  # corners closer together than this are one [member lengths]
+CORNER_SPACING = 0.5  # length of the curve on each side on which a corner turns most, and farthest way from it to its place [member lengths]
+CORNERS_APART = (
+    0.6  # of corners closer together the sharpest stays: the member between them would be too short [member lengths]
+)
 CURVED_FIT_RATIO = 6.0  # a side counts as curved if a quadratic fits it this many times better than a line
 MOST_ANGLE_RATIO = 1.3  # largest ratio of the angle of a corner to the angle between quadratics fitted to its sides
 MEDIAN_TURN_RATIO = 1.7  # a corner turns at least this many times more than the median of its loop
@@ -56,7 +59,7 @@ def find_corners(curve: np.ndarray, settings: Settings, coarser: float = 1.0) ->
             if angle > enough and np.linalg.norm(place - curve[i]) < CORNER_SPACING * settings.length:
                 found.append((angle, i, place))
                 break
-    return _apart(found, CORNER_SPACING * settings.length)
+    return _apart(found, CORNERS_APART * settings.length)
 
 
 def _peaks(turn: np.ndarray, enough: float) -> np.ndarray:

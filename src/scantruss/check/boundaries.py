@@ -74,6 +74,6 @@ def _figure(
     """Return a figure of values (K,) at places (K, 3) of which it keeps the worst within a member (K,) that are poor."""
     kept: list[int] = []
     for k in np.argsort(-values, kind="stable")[: int((values > poor).sum())].tolist():
-        if all(np.linalg.norm(places[k] - places[other]) > members[k] for other in kept):
+        if (np.linalg.norm(places[kept] - places[k], axis=1) > members[k]).all():
             kept.append(k)
     return Figure(kind, values[kept], places[kept], np.inf, poor, words)
