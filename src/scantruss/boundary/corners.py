@@ -16,7 +16,7 @@ CORNER_REACH = 2.0  # length of the curve on each side from which the place of a
 SHORTEST_SIDE = 0.6  # shortest length of the curve on each side, where another corner is near [member lengths]
 # start and end of the part of the curve on each side that shows where a corner may be [member lengths]
 SIGHT_ALONG_CURVE = (0.1, 0.8)
-CORNER_SPACING = 0.5  # length of the curve on each side on which a corner turns most, and farthest way from it to its place [member lengths]
+CORNER_SPACING = 0.5  # on each side, where a corner turns most; its place lies no farther off [member lengths]
 CORNERS_APART = (
     0.6  # of corners closer together the sharpest stays: the member between them would be too short [member lengths]
 )
