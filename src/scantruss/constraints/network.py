@@ -16,7 +16,7 @@ MEETING_DISTANCE = 0.3  # a line this close to the boundary or another line meet
 AT_END = 0.5
 # a line that stays close for longer than this runs alongside, and that part is left out [member lengths]
 ALONGSIDE_WITHIN = 1.2
-ONE_STOP = 0.5  # corners and meetings closer together than this are one [member lengths]
+ONE_STOP = 0.6  # corners and meetings closer together than this are one [member lengths]
 FADE_LENGTH = 0.6  # length over which a line is bent towards a meeting [member lengths]
 
 
