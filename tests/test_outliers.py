@@ -14,6 +14,7 @@ from scantruss.kernels.surface import samples as kernels
 from scantruss.scan.clean import outliers
 from scantruss.scan.clean.nearby import Nearby
 from scantruss.scan.cloud import measure_gap
+from scantruss.surface.chosen_samples import SPARSE_POINT
 from scantruss.surface.given_normals import NO_NORMALS
 from scantruss.surface.samples import sample_surface
 
@@ -294,3 +295,25 @@ def test_a_small_sparse_part_inside_a_sheet_stays_and_a_few_strays_go() -> None:
     strays = np.array([[5.0, 5.0, 9.0], [12.0, 3.0, -8.0], [20.0, 18.0, 12.0]])
     outlier = outliers.find_outliers(np.concatenate([sheet, strays]), 2.0)
     assert outlier[-3:].all() and outlier[:-3].mean() < 0.05
+
+
+@pytest.mark.parametrize("members", [0.5, 1.0, 3.0, 6.0])
+def test_a_grid_leaves_out_the_outliers_that_cleaning_does_whatever_its_length(members: float) -> None:
+    """Samples of long members do not stand alone where points do, and those of short ones do where points do not."""
+    for shape in (make("scallop", 30_000, outliers=0.1), make("scallop", 30_000)):
+        cleaned = clean_points(
+            shape.points, smooth=False, normals=False, duplicates=None, loose_pieces=None, layer_distance=None
+        )
+        count = next(step.count for step in cleaned.steps if step.name == "outliers")
+        cloud = st.PointCloud.from_array(shape.points)
+        assert sample_surface(cloud, st.Settings(length=members * shape.length)).outliers == count
+
+
+def test_what_is_too_far_apart_for_short_members_is_no_outlier() -> None:
+    """A scan of two densities: the sparse part is a part of it, but not for the shortest members."""
+    rng = np.random.default_rng(2)
+    x = np.concatenate([rng.uniform(0.0, 10.0, 20_000), rng.uniform(10.0, 20.0, 1500)])
+    points = np.column_stack([x, rng.uniform(0.0, 10.0, len(x)), 0.0 * x])
+    assert clean_points(points, smooth=False, normals=False).steps[2].count == 0
+    samples = sample_surface(st.PointCloud.from_array(points), st.Settings(length=0.2))
+    assert samples.outliers == 0 and (samples.judged == SPARSE_POINT).sum() > 1000

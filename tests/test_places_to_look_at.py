@@ -12,7 +12,7 @@ from typed import known
 
 import scantruss as st
 from scantruss.boundary.find import Boundary, Loop
-from scantruss.check.boundaries import places_aside
+from scantruss.check.boundaries import boundary_beyond, places_aside
 from scantruss.check.certify import certify, passed_grid
 from scantruss.check.doubtful import doubtful_places, zigzags
 from scantruss.check.gaps import bridged_gaps
@@ -58,6 +58,16 @@ def test_a_slit_that_joins_two_parts_is_listed_and_a_warning_with_its_width_and_
     (warning,) = warnings
     assert warning.where == gap.where
     assert float(warning.words.split(" gap ")[1].split()[0]) == pytest.approx(0.6, abs=0.15)
+
+
+@pytest.mark.parametrize(("half", "kind"), [(0.25, "gap"), (0.45, "bridged")])
+def test_a_bay_wider_than_two_thirds_of_a_member_that_a_grid_bridges_is_a_fault(half: float, kind: str) -> None:
+    points = sheet(13, 8, 0.06, keep=lambda x, y: (abs(x) > half) | (y > 0.0))
+    listed, (found,) = gaps_at(points)
+    assert found.kind == kind and found.where == listed[0].where
+    samples, grid = scanned(points, lattice())
+    certificate = certify(grid, samples, NOTHING, SETTINGS)
+    assert kind in {each.kind for each in (certificate.faults if kind == "bridged" else certificate.warnings)}
 
 
 def test_a_hole_a_little_wider_than_the_least_is_one_gap_wherever_it_lies() -> None:
@@ -242,6 +252,37 @@ def test_the_ring_of_a_limb_that_a_cap_closes_is_no_boundary_that_a_grid_leaves(
     for cut, said in (("close", False), ("open", True), ("", True)):
         limb = Loop(ring, np.zeros(0, np.int64), external=False, length=2.5, piece=0, cut=cut)
         assert bool(places_aside(grid, Boundary((outer, limb)), 1.0)) == said
+
+
+def test_a_grid_that_runs_beyond_the_scan_fails_and_one_that_stops_short_of_it_does_not() -> None:
+    """Over a bay from its edge, and out to a point beyond it; with fewer points, the rest is missed."""
+    for spoil, fails in (("nothing", False), ("bay", True), ("spike", True), ("short", False)):
+        grid = lattice()
+        boundary = bounded(grid)
+        (loop,), points = boundary.loops, sheet(13, 8, 0.08)
+        if spoil == "bay":
+            x, y, _ = loop.points.T
+            points = points[np.hypot(points[:, 0], points[:, 1] + 4.0 * 0.75**0.5) > 1.5]
+            inside = np.hypot(x, y + 4.0 * 0.75**0.5) < 1.5
+            turn = np.linspace(np.pi, 0.0, int(inside.sum()))
+            bay = loop.points.copy()
+            bay[inside] = np.column_stack([1.5 * np.cos(turn), 1.5 * np.sin(turn) - 4.0 * 0.75**0.5, 0.0 * turn])
+            boundary = Boundary((replace(loop, points=bay),))
+        if spoil == "spike":
+            (ring,) = grid.boundary_loops
+            v = next(int(v) for v in ring if abs(grid.nodes[v, 0]) < 0.6 and grid.nodes[v, 1] < -3.0)
+            grid = grid.replace(nodes=grid.nodes - np.outer(np.arange(len(grid.nodes)) == v, [0.0, 2.0, 0.0]))
+            boundary = bounded(lattice())
+        if spoil == "short":
+            sharp = next(int(v) for v in grid.boundary_loops[0] if (grid.triangles == v).sum() == 1)
+            grid = grid.replace(triangles=grid.triangles[~(grid.triangles == sharp).any(axis=1)])
+        samples, moved = scanned(points, grid)
+        shifted = Boundary(tuple(replace(each, points=each.points - moved.origin) for each in boundary.loops))
+        found = boundary_beyond(moved, samples, shifted, 1.0)
+        assert bool(found) == fails, spoil
+        if fails:
+            assert abs(known(found[0].where)[0]) < 2.0 and known(found[0].where)[1] < -1.5
+            assert found[0].words.startswith("runs beyond the boundary of the scan by ")
 
 
 def test_a_corner_that_is_cut_off_is_a_warning_with_its_place() -> None:

@@ -81,3 +81,28 @@ def test_a_rib_across_a_roof_is_named_and_a_bump_as_high_is_not() -> None:
     warning = known(warning_of(roof((np.abs(x - 1.0) < 0.2).astype(float)), 1.5))
     assert abs(known(warning.where)[0] - 1.0) < 0.6
     assert warning_of(roof((np.hypot(x - 1.0, y) < 1.0).astype(float)), 1.5) is None
+
+
+def strip(rise: float) -> np.ndarray:
+    """A canopy of 20 x 3, bent across by a rise."""
+    rng = np.random.default_rng(1)
+    x, y = rng.uniform(-1.5, 1.5, 20_000), rng.uniform(0.0, 20.0, 20_000)
+    return np.column_stack([x, y, rise * (1.0 - (x / 1.5) ** 2)]) + rng.normal(0.0, 0.004, (20_000, 3))
+
+
+@compiled_only
+@pytest.mark.parametrize("length", [3.0, 3.6])
+def test_a_row_of_triangles_under_a_bent_canopy_fails_and_names_its_share(length: float) -> None:
+    """Its folds do not tell how the scan is bent across it."""
+    with pytest.raises(
+        st.CertificateError, match=r"follows less than half of the scan: .*shorter members follow it"
+    ) as caught:
+        grid_from_points(strip(0.6), st.Settings(length=length, effort="quick"))
+    assert {fault.kind for fault in known(known(caught.value.grid).certificate).faults} == {"unfollowed"}
+
+
+@compiled_only
+@pytest.mark.parametrize(("rise", "length"), [(0.6, 1.5), (0.05, 3.0)])
+def test_a_canopy_of_shorter_members_passes_and_so_does_one_that_is_nearly_flat(rise: float, length: float) -> None:
+    grid = grid_from_points(strip(rise), st.Settings(length=length, effort="quick"))
+    assert known(grid.certificate).passed

@@ -1,4 +1,4 @@
-"""Where the boundary of a grid leaves that of its scan, or cuts a corner of it off."""
+"""Where the boundary of a grid leaves that of its scan, runs beyond it over nothing, or cuts a corner of it off."""
 
 from __future__ import annotations
 
@@ -10,13 +10,20 @@ import numpy as np
 from ..constraints.network import curves_of
 from ..grid.certificate import Fault
 from ..kernels.boundary.curves import Curves, distances_from_curves
+from ..kernels.mesh.coverage import nearest_distances
+from .distances import POINT_BOX, boxes_of, distances_to_grid
 from .limits import HEXAGON_BOUNDARY, Figure
 
 if TYPE_CHECKING:
     from ..boundary.find import Boundary
     from ..grid.grid import Grid
+    from ..surface.samples import SurfaceSamples
 
 WARN_ASIDE = 0.25  # distance between the boundaries of grid and scan above which it is poor [member lengths]
+# ... above which it is a fault where the grid covers what the scan does not, and how far from triangles its boundary, or from points a
+# member, must lie for that at most and at least; where a grid stops short, the share that it misses decides [member lengths]
+MOST_BEYOND, COVERED_WITHIN, EMPTY_FROM = 0.6, 0.2, 0.25
+SPACINGS_OUT = 5.0  # ... and in spacings of the points
 WARN_CUT = (
     0.15  # distance of a corner of the boundary from the nearest node of it above which it is cut off [member lengths]
 )
@@ -59,6 +66,41 @@ def places_aside(grid: Grid, boundary: Boundary, length: float) -> list[Fault]:
     )  # fmt: skip
     warnings = (replace(figure, places=figure.places + grid.origin).beyond(figure.poor) for figure in found)
     return [warning for warning in warnings if warning is not None]
+
+
+def boundary_beyond(grid: Grid, samples: SurfaceSamples, boundary: Boundary, length: float) -> list[Fault]:
+    """Return a fault where a grid runs far beyond the boundary of its scan: over a bay, or out to points that stand alone.
+
+    Parameters as of `places_aside`; samples : of the scan.
+    """
+    loops = [loop for loop in boundary.loops if loop.cut != "close"]
+    ends = grid.edges[grid.edge_uses == 1]
+    if not loops or not len(ends):
+        return []
+    own = np.full(len(grid.nodes), length) if grid.desired is None else grid.desired
+    bend = HEXAGON_BOUNDARY**2 if grid.cells == "hexagon" else 1.0
+    chained = curves_of([grid.nodes[chain] for chain in grid.boundary_loops], [True] * len(grid.boundary_loops))
+    curve, middles = np.concatenate([loop.points for loop in loops]), grid.nodes[ends].mean(axis=1)
+    at_middles, limit = own[ends].mean(axis=1), MOST_BEYOND * bend
+    at_curve = np.concatenate(
+        [length * (np.ones(len(loop.points)) if loop.desired is None else loop.desired) for loop in loops]
+    )
+    off_curve = _distances(chained, curve) / at_curve
+    off_middles = _distances(replace(boundary, loops=tuple(loops)).curves, middles) / at_middles
+    over, out = np.flatnonzero(off_curve > limit), np.flatnonzero(off_middles > limit)
+    if len(over):
+        over = over[distances_to_grid(curve[over], grid, length)[0] <= COVERED_WITHIN * at_curve[over]]
+    if len(out):
+        points, away = samples.measured_points, np.empty(len(out))
+        boxes = boxes_of(points, max(POINT_BOX * length, 2.0 * samples.spacing))
+        nearest_distances(middles[out], points, boxes, 2.0 * samples.spacing, away)
+        out = out[away > np.maximum(EMPTY_FROM * at_middles[out], SPACINGS_OUT * samples.spacing)]
+    off, places = np.concatenate([off_curve[over], off_middles[out]]), np.concatenate([curve[over], middles[out]])
+    members = np.concatenate([at_curve[over], at_middles[out]])
+    words = "runs beyond the boundary of the scan by {:.2f} members, over nothing that was measured"
+    figure = _figure("beyond", words, limit, off, places + grid.origin, members)
+    fault = figure.beyond(figure.poor)
+    return [fault] if fault is not None else []
 
 
 def _distances(curves: Curves, places: np.ndarray) -> np.ndarray:

@@ -15,19 +15,19 @@ from ..errors import CertificateError
 from ..grid.certificate import Certificate, Fault, Spread, Worst, place_of
 from ..runtime.parallel import side_by_side
 from ..surface.chosen_samples import KEPT, LIMB, SLIT
-from .boundaries import places_aside
+from .boundaries import boundary_beyond, places_aside
 from .crossings import find_crossings
 from .defects import faults_in_space, faults_of_topology
 from .distances import Distances, measure_distances, offsets_from_points
 from .doubtful import doubtful_places
 from .folds import fold_angles
-from .gaps import bridged_gaps
+from .gaps import bridged_gaps, openings_closed
 from .hanging import hanging_nodes, nodes_off_sheets
 from .irregular import count_irregular
 from .left_out import closed_holes, first_and_more, parts_left_out
 from .limits import NOISES_OFF, ROUNDED_BY, limits_of, places_to_look_at, widened_limits
 from .sheets import cut_apart, faults_on_sheets, nodes_of_samples
-from .unfollowed import unfollowed_parts
+from .unfollowed import mostly_unfollowed, unfollowed_parts
 
 if TYPE_CHECKING:
     from ..boundary.find import Boundary
@@ -93,14 +93,15 @@ class Judged:
             return self.certificate
         grid, samples, boundary, settings = self.grid, self.samples, self.boundary, self.settings
         members = _desired_at_points(grid, found, length)
-        followed = (samples.judged == KEPT) & ~samples.elsewhere
+        followed = _to_follow(samples)
         missed_at = place_of(samples.scan[_missed(found, followed, members)] + samples.origin)
         rough = samples.moved  # then its roughness is the scatter
-        offsets, (gaps, bridged), doubtful, aside, beside, apart, off_sheets = side_by_side(
+        offsets, (gaps, bridged), doubtful, aside, beyond, beside, apart, off_sheets = side_by_side(
             lambda: _offsets(grid, samples, length),
             lambda: bridged_gaps(grid, samples, boundary, length),
             lambda: [] if settings.boundary else doubtful_places(grid, samples, length),
             lambda: places_aside(grid, boundary, length),
+            lambda: boundary_beyond(grid, samples, boundary, length),
             lambda: [] if rough else unfollowed_parts(grid, samples, found, followed, members),
             lambda: cut_apart(grid, samples, found, length),
             lambda: nodes_off_sheets(grid, samples, length),
@@ -108,10 +109,23 @@ class Judged:
         roughness = NOISES_OFF * offsets.get("node_scatter", 0.0) if rough else 0.0
         rounded = _rounded(found, followed, members, roughness)
         places = places_to_look_at(self.certificate, missed_at, rounded)
+        holes = [*closed_holes(samples, boundary), *first_and_more(gaps)]
+        lids = openings_closed(holes, bridged, length, grid.unit)
         return replace(
             self.certificate,
-            left_out=(*self.certificate.left_out, *closed_holes(samples, boundary), *first_and_more(gaps)),
-            warnings=(*self.certificate.warnings, *apart, *off_sheets, *bridged, *doubtful, *aside, *beside, *places),
+            left_out=(*self.certificate.left_out, *holes),
+            faults=(*self.certificate.faults, *beyond, *(each for each in bridged if each.kind == "bridged")),
+            warnings=(
+                *self.certificate.warnings,
+                *apart,
+                *off_sheets,
+                *(each for each in bridged if each.kind == "gap"),
+                *lids,
+                *doubtful,
+                *aside,
+                *beside,
+                *places,
+            ),
             **offsets,
         )
 
@@ -134,7 +148,12 @@ def judge(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings: Set
     faults = [*faults_of_topology(grid, certificate, boundary), *faults_in_space(grid, certificate, cuts, settings)]
     too_far, poor = limits_of(grid, found, settings)
     known = {fault.kind for fault in faults}
-    further = (*too_far, *faults_on_sheets(grid, samples, nearest), *hanging_nodes(grid, samples, found, length))
+    further = (
+        *too_far,
+        *faults_on_sheets(grid, samples, nearest),
+        *hanging_nodes(grid, samples, found, length),
+        *_mostly_unfollowed(grid, samples, found, length),
+    )
     faults += [fault for fault in further if fault.kind not in known]
     certificate = replace(certificate, faults=tuple(faults), warnings=tuple(poor), widened=widened_limits(settings))
     return Judged(grid, samples, boundary, settings, certificate, found)
@@ -178,6 +197,10 @@ def _way_out(found: Certificate) -> str:
     kinds = {fault.kind for fault in found.faults}
     if kinds == {"cover"} and found.missing > MOST_ACCEPTED:
         return "choose the part that is wanted with --crop or --piece; --keep-failed gives it all the same"
+    if kinds == {"unfollowed"}:
+        return "shorter members follow it; --keep-failed gives it all the same"
+    if kinds <= {"beyond", "bridged"}:
+        return "shorter members keep to it, --crop leaves out what lies beyond it; --keep-failed gives it all the same"
     if "hanging" in kinds:
         return "--crop or --piece leaves out what lies off the surface, shorter members keep to it; --keep-failed gives it all the same"
     if kinds == {"cover"} and found.missing > 0.0:
@@ -251,6 +274,19 @@ def _desired_at_points(grid: Grid, found: Distances, length: float) -> np.ndarra
     """Return the desired length at each point that was read (N,): that of the nearest triangle."""
     lengths: np.ndarray = _desired(grid, length)[grid.triangles].mean(axis=1)[found.triangle]
     return lengths
+
+
+def _to_follow(samples: SurfaceSamples) -> np.ndarray:
+    """Return which points a grid is to follow (N,) bool."""
+    followed: np.ndarray = (samples.judged == KEPT) & ~samples.elsewhere
+    return followed
+
+
+def _mostly_unfollowed(grid: Grid, samples: SurfaceSamples, found: Distances, length: float) -> list[Fault]:
+    """Return a fault where a grid follows less than half of its scan; of a rough one the roughness is scatter."""
+    if samples.moved:
+        return []
+    return mostly_unfollowed(grid, samples, found, _to_follow(samples), _desired_at_points(grid, found, length))
 
 
 def _missed(found: Distances, followed: np.ndarray, members: np.ndarray) -> int:

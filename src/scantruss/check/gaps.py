@@ -36,7 +36,10 @@ POINTS_AROUND_MIDDLE = (
 ACROSS = np.stack(np.meshgrid(*[np.linspace(-0.6, 0.6, 7)] * 2), axis=-1).reshape(
     -1, 2
 )  # places around another [reach]
+MOST_BRIDGED = 0.65  # width of a gap that is open there from which on a grid that bridges it fails [member lengths]
 OPEN = 0.1  # distance of the boundary from the nearest point from which on a gap there is open [member lengths]
+
+WIDE_OPENING = 0.5  # longest side from which on an opening that is closed is said [member lengths]
 
 GAPS_LOOKED_AT = 500  # places that are looked at closely, those farthest from all points first
 
@@ -46,7 +49,8 @@ def bridged_gaps(
 ) -> tuple[list[LeftOut], list[Fault]]:
     """Return the gaps that a grid bridges and that are not known as closed holes, the widest first, and a warning.
 
-    The warning is of those that are open at the boundary of the grid: there it joins what is apart, or covers a bay.
+    The warning is of those that are open at the boundary of the grid: there it joins what is apart, or covers a bay. It is a fault, of
+    kind "bridged", where one of them is wider than `MOST_BRIDGED`.
 
     Points at random leave a disc of radius d free with a probability of exp(-pi d^2 density), and the ring from d to twice d, of three
     times its area, tells the density there: n points around an empty disc mean that it would hold n / 3. Discs lie in the planes of
@@ -87,7 +91,7 @@ def bridged_gaps(
     triangle = owner[far]
     group = _groups(grid, triangle, places[far], half)[triangle]
     is_open = _open_triangles(grid, samples.measured_points, boxes, length)
-    found: list[tuple[float, LeftOut, bool]] = []
+    found: list[tuple[float, LeftOut, bool, bool]] = []
     for each in np.unique(group):
         own = np.flatnonzero(group == each)
         widest = own[half[own].argmax()]
@@ -95,16 +99,35 @@ def bridged_gaps(
         if not _is_known(middle, samples, boundary):
             size = float(np.ptp(places[far[own]], axis=0).max()) + width
             gap = LeftOut("gap", 0, 0.0, place_of(middle + samples.origin), size)
-            found.append((width, gap, bool(is_open[triangle[own]].any())))
+            too_wide = width > MOST_BRIDGED * float(members[triangle[widest]])
+            found.append((width, gap, bool(is_open[triangle[own]].any()), too_wide))
     found.sort(key=lambda each: -each[0])
     unit = f" {samples.unit}" if samples.unit else ""
-    wide = [(width, gap.where) for width, gap, reaches_boundary in found if reaches_boundary]
+    wide = [(width, gap.where) for width, gap, reaches_boundary, _ in found if reaches_boundary]
+    kind = "bridged" if any(reaches_boundary and too_wide for _, _, reaches_boundary, too_wide in found) else "gap"
     more = f" ({len(wide)} such places)" if len(wide) > 1 else ""
     words = f"bridges a gap {wide[0][0]:.3g}{unit} wide{more}" if wide else ""
     warnings = (
-        [Fault("gap", words, wide[0][1], tuple(where for _, where in wide[1:PLACES_KEPT] if where))] if wide else []
+        [Fault(kind, words, wide[0][1], tuple(where for _, where in wide[1:PLACES_KEPT] if where))] if wide else []
     )
-    return [gap for _, gap, _ in found], warnings
+    return [gap for _, gap, _, _ in found], warnings
+
+
+def openings_closed(holes: list[LeftOut], said: list[Fault], length: float, unit: str) -> list[Fault]:
+    """Return a warning of the openings that a grid closes though nobody asked for it, and that are not small; none of those said."""
+    known = {place for fault in said for place in (fault.where, *fault.also)}
+    wide = [
+        hole
+        for hole in holes
+        if not hole.asked and hole.where not in known and (hole.size or 0.0) > WIDE_OPENING * length
+    ]
+    if not wide:
+        return []
+    wide.sort(key=lambda hole: -(hole.size or 0.0))
+    places, count = [hole.where for hole in wide if hole.where], sum(hole.number for hole in wide)
+    more = f" ({count} such places)" if count > 1 else ""
+    words = f"closes an opening {wide[0].size:.3g}{unit and ' ' + unit} across{more}; shorter members leave it open"
+    return [Fault("closed", words, places[0] if places else None, tuple(places[1:PLACES_KEPT]))]
 
 
 def _nearest(places: np.ndarray, points: np.ndarray, boxes: SearchBoxes, spacing: float) -> np.ndarray:

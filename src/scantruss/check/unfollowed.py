@@ -1,4 +1,4 @@
-"""Parts of a scan that run along its grid and that it does not follow, such as a ring beam, a rib, an upstand or a second layer."""
+"""What lies along a grid and is not followed: parts such as a ring beam, a rib or a second layer, or most of the scan."""
 
 from __future__ import annotations
 
@@ -23,6 +23,9 @@ CUBE, LEAST_CUBE = 0.25, 0.1  # widest and narrowest cubes in which most points 
 SPACINGS_OF_CUBE = 4.0  # width of the cubes between these: some points lie in each [spacings of the points]
 LONG = 6.0  # longest side of the box around such a part from which on it is no bump that members round off [member lengths]
 WARN_SHARE = 0.01  # share of the points in such a part from which on it is said
+# share of the points that a grid is to follow above which it does not follow the scan, and how far off those are at least, beyond
+# the noise [member lengths]: as where one row of triangles runs along a bent strip; of two layers, followed by turns, it is half at most
+MOST_UNFOLLOWED, LEAST_OFF = 0.55, 0.05
 
 
 def unfollowed_parts(
@@ -37,14 +40,8 @@ def unfollowed_parts(
     chosen : (N,) bool, points of the scan that the grid is to follow
     members : (N,) desired member length at each point [scan unit]
     """
-    noise = float(np.median(found.noise))
-    near = np.flatnonzero(chosen & (found.scan <= members))
-    off = found.scan[near] > _followed_to(grid)[found.triangle[near]] * members[near] + noise
-    if off.sum() < WARN_SHARE * len(samples.scan):
-        return []
-    longest = float(members.max())
-    side = min(max(SPACINGS_OF_CUBE * samples.spacing, LEAST_CUBE * longest), CUBE * longest)
-    which = near[off & _mostly(off, samples.scan[near], side)]
+    side = _cube(samples, members)
+    which = _off(samples, found, chosen, members, _followed_to(grid), WARN_SHARE * len(samples.scan))
     if not len(which):
         return []
     part = points_together(samples.scan[which], np.full(len(which), side))
@@ -53,6 +50,50 @@ def unfollowed_parts(
     parts = [which[part == number] for number in large[np.argsort(-points[large], kind="stable")].tolist()]
     long = [own for own in parts if _size(own, samples) >= LONG * members[own].mean()]
     return [_warning(grid, samples, found, long)] if long else []
+
+
+def mostly_unfollowed(
+    grid: Grid, samples: SurfaceSamples, found: Distances, chosen: np.ndarray, members: np.ndarray
+) -> list[Fault]:
+    """Return a fault where a grid follows less than half of the points that it is to follow; parameters as of `unfollowed_parts`."""
+    followed_to = np.maximum(_followed_to(grid), LEAST_OFF)
+    which = _off(samples, found, chosen, members, followed_to, MOST_UNFOLLOWED * int(chosen.sum()))
+    if len(which) <= MOST_UNFOLLOWED * chosen.sum():
+        return []
+    unit, worst = f" {grid.unit}" if grid.unit else "", int(which[found.scan[which].argmax()])
+    words = (
+        f"follows less than half of the scan: {len(which) / chosen.sum():.1%} of its points lie up to"
+        f" {found.scan[worst]:.3g}{unit} off"
+    )
+    return [Fault("unfollowed", words, place_of(samples.scan[worst] + samples.origin))]
+
+
+def _off(
+    samples: SurfaceSamples,
+    found: Distances,
+    chosen: np.ndarray,
+    members: np.ndarray,
+    followed_to: np.ndarray,
+    least: float,
+) -> np.ndarray:
+    """Return the numbers of the chosen points (N,) bool that lie off the triangles, where most do; none where these are too few.
+
+    followed_to : (T,) up to which distance from each triangle points are followed, noise aside [member lengths]
+    least : fewest points that are looked at closely
+    """
+    noise = float(np.median(found.noise))
+    near = np.flatnonzero(chosen & (found.scan <= members))
+    off = found.scan[near] > followed_to[found.triangle[near]] * members[near] + noise
+    if off.sum() < max(least, 1):
+        return near[:0]
+    which: np.ndarray = near[off & _mostly(off, samples.scan[near], _cube(samples, members))]
+    return which
+
+
+def _cube(samples: SurfaceSamples, members: np.ndarray) -> float:
+    """Return the width of the cubes in which most points must lie off [scan unit]."""
+    longest = float(members.max())
+    return min(max(SPACINGS_OF_CUBE * samples.spacing, LEAST_CUBE * longest), CUBE * longest)
 
 
 def _followed_to(grid: Grid) -> np.ndarray:

@@ -23,8 +23,9 @@ class Worst:
 class Fault:
     """What is wrong with a grid; "the grid " and `words` make a sentence."""
 
-    #: empty manifold orientable pieces loops crossing folded uneven cover torn astray fixed; angle short long offset as fault or
-    #: warning; of a warning far, left out, gap, hole, zigzag, aside, cut, missed, rounded, unfollowed, apart, ridge
+    #: empty manifold orientable pieces loops crossing folded uneven cover torn astray fixed beyond bridged; angle
+    #: short long offset unfollowed as fault or warning; of a warning aside, far, left out, gap, closed, hole, zigzag, cut,
+    #: missed, rounded, apart, ridge
     kind: str
     words: str
     where: Place | None = None  #: a place in the scan's own frame [scan unit], the worst

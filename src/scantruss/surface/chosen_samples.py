@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..scan.clean.outliers import has_outliers, judge_points
+from ..scan.clean.outliers import has_outliers, judge_points, too_far_apart
 from ..scan.cloud import Bounds, bounds_of
 from ..settings import SAMPLE_SPACING, SMOOTH_SAMPLE_SPACING, Settings
 from .given_normals import GivenNormals
@@ -49,7 +49,7 @@ class Asked(NamedTuple):
     piece: str
     z_is_up: bool
     limb_girth: float  #: below which limbs are cut off [desired lengths]
-    judge_always: bool  #: whether outliers are looked for even if no sample stands alone
+    judge_always: bool  #: whether outliers are looked for, and not only points too far apart for the length
     smooth_scale: float  #: size of what is smoothed away [`length`]
     sharp_edges: bool  #: whether samples on sharp edges of bodies face away from them
     plain_body: bool  #: whether thin limbs are taken off the body that the scan encloses, and slits filled
@@ -131,7 +131,10 @@ def usual_samples(
     some = thin_dense(points, bounds, radius, spacing) if thinned else points
     found = link_samples(some, radius, length, spacing, given)
     if asked.outlier_distance and (asked.judge_always or has_outliers(found.neighbors)):
-        outlier, sparse = judge_points(points, asked.outlier_distance, length)
+        if asked.judge_always:
+            outlier, sparse = judge_points(points, asked.outlier_distance, length)
+        else:
+            outlier, sparse = np.zeros(len(points), np.bool_), too_far_apart(points, asked.outlier_distance, length)
         if outlier.any() or sparse.any():
             judged = np.where(outlier, OUTLIER, np.where(sparse, SPARSE_POINT, KEPT)).astype(np.uint8)
             points = np.ascontiguousarray(points[judged == KEPT])

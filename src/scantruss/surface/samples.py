@@ -13,6 +13,7 @@ from ..kernels.scan.nearby import nearest_places
 from ..kernels.surface.local_surface import Surface
 from ..runtime.parallel import in_parts
 from ..scan.clean.duplicates import find_repeated, has_repeats
+from ..scan.clean.outliers import some_stand_alone
 from ..scan.cloud import Bounds, PointCloud, bounds_of
 from ..scan.normals import mean_normals
 from ..settings import SAMPLE_SPACING, SMOOTH_SAMPLE_SPACING, Settings
@@ -136,6 +137,7 @@ class SurfaceSamples:
 
 
 _SAMPLES_OF_CLOUDS: weakref.WeakKeyDictionary[PointCloud, dict[Asked, SurfaceSamples]] = weakref.WeakKeyDictionary()
+_OUTLIERS_OF_CLOUDS: weakref.WeakKeyDictionary[PointCloud, bool] = weakref.WeakKeyDictionary()
 
 
 def sample_surface(cloud: PointCloud, settings: Settings) -> SurfaceSamples:
@@ -149,6 +151,8 @@ def sample_surface(cloud: PointCloud, settings: Settings) -> SurfaceSamples:
         are left out; `length_field` where members are longer; `sharp_edges` whether edges of bodies are looked at.
     """
     asked = Asked.of(settings, cloud.origin, cloud.z_is_up)
+    if asked.outlier_distance and not asked.judge_always:
+        asked = asked._replace(judge_always=_has_outliers(cloud))
     kept = _SAMPLES_OF_CLOUDS.setdefault(cloud, {})
     if asked not in kept:
         kept.clear()
@@ -157,6 +161,13 @@ def sample_surface(cloud: PointCloud, settings: Settings) -> SurfaceSamples:
         unread = (*cloud.left_out, *((WITHOUT_COORDINATES, cloud.dropped) for _ in range(cloud.dropped > 0)))
         kept[asked] = replace(made, origin=cloud.origin, unit=cloud.unit, system=cloud.system, unread=unread)
     return kept[asked]
+
+
+def _has_outliers(cloud: PointCloud) -> bool:
+    """Whether outliers are looked for in a cloud, at every length, as `scan.clean.steps` does; kept as long as the cloud lives."""
+    if cloud not in _OUTLIERS_OF_CLOUDS:
+        _OUTLIERS_OF_CLOUDS[cloud] = some_stand_alone(cloud.points, cloud.spacing)
+    return _OUTLIERS_OF_CLOUDS[cloud]
 
 
 def is_graded(surface: Surface) -> bool:
