@@ -15,7 +15,7 @@ INSTALLED = ("--isolated", "--no-editable", "--reinstall-package", "scantruss", 
 
 
 def interpreter(python: str) -> str:
-    """Return the newest Python of a version that pyenv has, which uv sees only where it is switched on; else the version, for uv to find."""
+    """Return the newest Python of a version that pyenv has, which uv sees only where it is switched on; else the version."""
     versions = Path(os.environ.get("PYENV_ROOT") or Path.home() / ".pyenv") / "versions"
     places = [path / "bin" / "python" for path in versions.glob(f"{python}.*") if path.name.replace(".", "").isdigit()]
     newest = max(places, key=lambda place: int(place.parts[-3].rpartition(".")[2]), default=None)
