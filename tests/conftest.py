@@ -9,6 +9,7 @@ import shutil
 import signal
 import sys
 import tempfile
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -31,14 +32,16 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 def pytest_configure(config: pytest.Config) -> None:
     """Keep bytecode with pytest's cache where Python may write none beside modules: hundreds of processes import us, a second each."""
-    if sys.dont_write_bytecode and (cache := getattr(config, "cache", None)) is not None:
-        sys.pycache_prefix, sys.dont_write_bytecode = str(cache.mkdir("bytecode")), False
-        os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix  # of what is started from here, workers among it
-        os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
-        for left in Path(sys.pycache_prefix + tempfile.gettempdir()).glob(
-            "pytest-of-*"
-        ):  # of what earlier tests copied
+    cache = getattr(config, "cache", None)
+    if not sys.dont_write_bytecode or cache is None:
+        return
+    with suppress(OSError):  # of a folder that cannot be written
+        folder = str(cache.mkdir("bytecode"))
+        for left in Path(folder + tempfile.gettempdir()).glob("pytest-of-*"):  # of what earlier tests copied
             shutil.rmtree(left, ignore_errors=True)
+        sys.pycache_prefix, sys.dont_write_bytecode = folder, False
+        os.environ["PYTHONPYCACHEPREFIX"] = folder  # of what is started from here, workers among it
+        os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 
 def pytest_sessionfinish() -> None:
