@@ -3,6 +3,7 @@
 Each Python gets a wheel of its own, so that none takes the machine code of another; one that uv can neither find nor fetch fails.
 """
 
+import os
 import subprocess
 import sys
 import tempfile
@@ -13,17 +14,25 @@ ROOT = Path(__file__).resolve().parents[1]
 INSTALLED = ("--isolated", "--no-editable", "--reinstall-package", "scantruss", "--group", "test")
 
 
+def interpreter(python: str) -> str:
+    """Return the newest Python of a version that pyenv has, which uv sees only where it is switched on; else the version."""
+    versions = Path(os.environ.get("PYENV_ROOT") or Path.home() / ".pyenv") / "versions"
+    places = [path / "bin" / "python" for path in versions.glob(f"{python}.*") if path.name.replace(".", "").isdigit()]
+    newest = max(places, key=lambda place: int(place.parts[-3].rpartition(".")[2]), default=None)
+    return python if newest is None else str(newest)
+
+
 def works(python: str, arguments: list[str]) -> bool:
     """Whether the package installs on a Python, makes the grid of the demo and passes the tests."""
     with tempfile.TemporaryDirectory() as folder:
         demo = subprocess.run(
-            ["uv", "run", "--python", python, *INSTALLED, "scantruss", "demo", f"{folder}/demo"], cwd=ROOT
+            ["uv", "run", "--python", interpreter(python), *INSTALLED, "scantruss", "demo", f"{folder}/demo"], cwd=ROOT
         )
     tests = [
         "uv",
         "run",
         "--python",
-        python,
+        interpreter(python),
         *INSTALLED[:2],
         *INSTALLED[4:],
         "python",

@@ -2,28 +2,36 @@
 
 from __future__ import annotations
 
+import os
 import socket
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from browser import PATIENCE
 
 from scantruss.studio.browsers import Browsers
 from scantruss.studio.server import serve_browsers, start_server
 from scantruss.studio.session import Session
 
+PORTS = range(
+    20_000, 32_000
+)  # none of those that a system gives to whoever connects, which would take one while its server is away
 SMALL = {"width": 700, "height": 420}  # of a window: drawn by software, the smaller the sooner [pixel]
 
 
 def free_port() -> int:
-    """Return a port that nobody uses."""
-    with socket.socket() as trial:
-        trial.bind(("127.0.0.1", 0))
-        return int(trial.getsockname()[1])
+    """Return a port that nobody uses; processes look for theirs from different ones on."""
+    for port in (PORTS[(97 * os.getpid() + k) % len(PORTS)] for k in range(len(PORTS))):
+        with socket.socket() as trial, suppress(OSError):
+            trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            trial.bind(("127.0.0.1", port))
+            return port
+    raise RuntimeError("no port is free")
 
 
 @contextmanager
@@ -56,7 +64,21 @@ def served_dome(folder: Path) -> Iterator[tuple[str, Session, Any]]:
         yield address, session, pages
 
 
-def until(holds: Callable[[], bool], seconds: float = 30.0) -> bool:
+def until_drawn(pages: Any) -> None:
+    """Wait until the page that was opened last has drawn all that the server has sent: it is asked for a picture, which comes after it."""
+    _, view = list(pages._views.values())[-1]
+    view.client.get_render(8, 8, timeout=PATIENCE)
+
+
+def click_corners(page: Any, pages: Any, *places: tuple[float, float]) -> None:
+    """Click the corners of a polygon on the page that was opened last, each once the one before has been taken."""
+    _, view = list(pages._views.values())[-1]
+    for count, place in enumerate(places, start=1):
+        page.mouse.click(*place)
+        assert until(lambda count=count: len(view.scan.crop._corners) == count)  # type: ignore[misc]
+
+
+def until(holds: Callable[[], bool], seconds: float = PATIENCE) -> bool:
     """Wait until something holds; whether it does."""
     end = time.monotonic() + seconds
     while not holds() and time.monotonic() < end:  # ends: time passes
@@ -67,7 +89,7 @@ def until(holds: Callable[[], bool], seconds: float = 30.0) -> bool:
 def tab(page: Any, name: str) -> None:
     """Go to a step."""
     page.click(f"[role=tab]:has-text('{name}')")
-    page.wait_for_timeout(200)
+    page.wait_for_selector(f"[role=tab][aria-selected=true]:has-text('{name}')")
 
 
 def field(page: Any, name: str) -> Any:

@@ -4,6 +4,7 @@ import ast
 import re
 from collections import Counter
 from collections.abc import Iterator
+from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -46,7 +47,8 @@ def layer_of(name: str) -> int:
     raise AssertionError(f"{name} has no place in the layers")
 
 
-def imports_of(name: str, with_types: bool = False) -> set[str]:
+@cache
+def imports_of(name: str, with_types: bool = False) -> frozenset[str]:
     """Return the modules of the package that a module imports, wherever it does; `with_types`: also for type checkers only."""
     path = MODULES[name]
     tree = ast.parse(path.read_text(encoding="utf-8"))
@@ -68,7 +70,7 @@ def imports_of(name: str, with_types: bool = False) -> set[str]:
         for alias in node.names:
             inner = ".".join([*base, alias.name])
             found.add(inner if inner in MODULES else ".".join(base) or "__init__")
-    return found - {name}
+    return frozenset(found) - {name}
 
 
 @pytest.mark.parametrize("name", sorted(MODULES.keys() - {"__init__"}))

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from browser import open_page
+from browser import PATIENCE, open_page
 from PIL import Image
 from studio_person import choose, field, served_dome, tab, until
 
@@ -44,7 +44,7 @@ def test_a_person_makes_quads_and_a_double_layer(tmp_path: Path) -> None:
         tab(page, "Grid")
         field(page, "draw panels").uncheck()
         page.wait_for_selector("text=undo: unit", state="attached")
-        assert until(lambda: session.grid is not None) and session.worker.wait(60)
+        assert until(lambda: session.grid is not None) and session.worker.wait(PATIENCE)
         with_diagonals = at_rest(page)
         tab(page, "Design")
         choose(page, "triangle", "quad")

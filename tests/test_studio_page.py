@@ -15,9 +15,21 @@ import numpy as np
 import openpyxl
 import pytest
 import trimesh
-from browser import open_page
+from browser import PATIENCE, open_page
 from PIL import Image
-from studio_person import SMALL, choose, drag, field, free_port, served_dome, tab, until, write_dome
+from studio_person import (
+    SMALL,
+    choose,
+    click_corners,
+    drag,
+    field,
+    free_port,
+    served_dome,
+    tab,
+    until,
+    until_drawn,
+    write_dome,
+)
 
 import scantruss as st
 from scantruss.cli.main import main
@@ -29,29 +41,29 @@ from scantruss.studio.tab_out import words_of_suffix
 
 
 @pytest.fixture
-def served(tmp_path: Path) -> Iterator[tuple[str, Session]]:
+def served(tmp_path: Path) -> Iterator[tuple[str, Session, Any]]:
     """Serve a studio with a shallow dome."""
-    with served_dome(tmp_path) as (address, session, _):
-        yield address, session
+    with served_dome(tmp_path) as given:
+        yield given
 
 
 def status(address: str, **head: str) -> int:
     """Return the status that a request gets."""
     try:
-        with urllib.request.urlopen(urllib.request.Request(address, headers=head), timeout=10) as answer:
+        with urllib.request.urlopen(urllib.request.Request(address, headers=head), timeout=PATIENCE) as answer:
             return int(answer.status)
     except urllib.error.HTTPError as error:
         error.close()
         return error.code
 
 
-def test_only_our_own_page_is_served(served: tuple[str, Session]) -> None:
-    address, _ = served
+def test_only_our_own_page_is_served(served: tuple[str, Session, Any]) -> None:
+    address, *_ = served
     assert status(address) == 200
     assert status(address, Origin="http://example.org") == 403
     assert status(address, Host="example.org") == 403
     assert status(address + "../../../../etc/passwd") == 404
-    with urllib.request.urlopen(address, timeout=10) as answer:
+    with urllib.request.urlopen(address, timeout=PATIENCE) as answer:
         assert answer.headers["X-Frame-Options"] == "DENY"  # no other page shows it within itself
         page = answer.read()
         assert int(answer.headers["Content-Length"]) == len(page)
@@ -180,8 +192,8 @@ FAINT = """() => {  // what is written with less contrast than 4.5 to 1 (WCAG 2.
 }"""
 
 
-def test_a_person_makes_a_grid_and_a_structure(served: tuple[str, Session], tmp_path: Path) -> None:
-    address, session = served
+def test_a_person_makes_a_grid_and_a_structure(served: tuple[str, Session, Any], tmp_path: Path) -> None:
+    address, session, pages = served
     with open_page(address) as (page, errors):
         asked: list[Any] = []
         page.on("request", lambda request: asked.append(request.url))
@@ -217,19 +229,20 @@ def test_a_person_makes_a_grid_and_a_structure(served: tuple[str, Session], tmp_
         page.click("button:has-text('Find what fewer cost')")
         page.click("svg [data-low='5'] rect")
         page.wait_for_selector("text=undo: 5 lengths")
-        assert session.worker.wait(60) and session.grid.alike is not None and session.grid.alike.count == 5
+        assert session.worker.wait(PATIENCE) and session.grid.alike is not None and session.grid.alike.count == 5
         page.click("button:has-text('Undo')")
         tab(page, "Constraints")
         page.click("button:has-text('Place by clicks')")
         page.wait_for_selector("input[value='place fixed node']")
         page.mouse.click(410, 350)
         page.wait_for_selector("text=undo: fixed node")
-        assert session.worker.wait(60) and len(session.settings.fixed) == 1
+        assert session.worker.wait(PATIENCE) and len(session.settings.fixed) == 1
         (place,) = session.settings.fixed
         assert abs(place[2] - (2 - 0.04 * ((place[0] - 5) ** 2 + (place[1] - 5) ** 2))) < 1e-6  # it lies on the scan
         assert session.grid is not None and session.grid.fixed.sum() == 1
+        until_drawn(pages)
         drag(page, (410, 350), (460, 330))
-        assert until(lambda: session.settings.fixed != (place,)) and session.worker.wait(60)
+        assert until(lambda: session.settings.fixed != (place,)) and session.worker.wait(PATIENCE)
         (moved,) = session.settings.fixed
         assert abs(moved[2] - (2 - 0.04 * ((moved[0] - 5) ** 2 + (moved[1] - 5) ** 2))) < 1e-6
         for _ in range(2):
@@ -240,7 +253,7 @@ def test_a_person_makes_a_grid_and_a_structure(served: tuple[str, Session], tmp_
         page.click("text=Length brush")
         page.click("button:has-text('Paint')")
         page.wait_for_selector("input[value='paint length']")
-        page.wait_for_timeout(500)
+        until_drawn(pages)
         drag(page, (400, 380), (470, 360))
         page.wait_for_selector("text=undo: paint")
         assert len({row[3] for row in session.settings.length_field}) == 2
@@ -254,7 +267,7 @@ def test_a_person_makes_a_grid_and_a_structure(served: tuple[str, Session], tmp_
             page.wait_for_timeout(300)
         page.click("button:has-text('Finish')")
         page.wait_for_selector("text=undo: fixed line")
-        assert session.worker.wait(60) and session.grid.line_sets[0].name == "line 1"
+        assert session.worker.wait(PATIENCE) and session.grid.line_sets[0].name == "line 1"
         choose(page, "draw line", "select")
         page.mouse.click(410, 370)
         page.wait_for_selector("text=/(node|member|panel) [NMP]\\d+/")
@@ -267,7 +280,7 @@ def test_a_person_makes_a_grid_and_a_structure(served: tuple[str, Session], tmp_
         field(page, "section").fill("CHS114.3x5")
         page.click("button:has-text('Run')")
         page.wait_for_selector("text=mass without nodes")
-        assert session.worker.wait(60) and session.solution is not None
+        assert session.worker.wait(PATIENCE) and session.solution is not None
         tab(page, "Grid")
         choose(page, "utilization", "member length")
         assert len(np.unique(shown_colors(page), axis=0)) > 50  # something is drawn
@@ -309,7 +322,7 @@ class Served:
         """Kill the server at once, whatever it is at."""
         if self._process is not None:
             self._process.kill()
-            self._process.communicate(timeout=30)
+            self._process.communicate(timeout=PATIENCE)
 
 
 @pytest.fixture
@@ -334,27 +347,26 @@ def test_a_server_that_is_killed_loses_nothing_but_what_it_was_at(killable: Serv
         tab(page, "Design")
         field(page, "exactly").fill("0.4")  # many members, whose sizing takes a while
         page.click("button:has-text('Generate')")
-        page.wait_for_selector("text=undo: generate", timeout=120_000)
+        page.wait_for_selector("text=undo: generate")
         said = page.inner_text("p:has-text('members')").partition("\n")[0]
         killable.kill()
         killable.begin("dome.scantruss")  # the page, which lost it, goes on by itself
-        page.wait_for_selector("text=undo: generate", state="detached", timeout=60_000)
+        page.wait_for_selector("text=undo: generate", state="detached")
         tab(page, "Design")
         page.wait_for_selector(f"text={said.strip()}")
         tab(page, "Structure")
         page.click("button:has-text('Run')")
-        page.wait_for_selector("text=undo: run", timeout=120_000)
+        page.wait_for_selector("text=undo: run")
         figures = page.inner_text("p:has-text('mass without nodes')")
         page.click("text=Sizing and modes")
-        page.wait_for_timeout(500)
         field(page, "section").fill("CHS139.7x5")
         field(page, "most sections").fill("6")
         page.click("button:has-text('Run')")
-        page.wait_for_selector("[role=status]:has-text('weight curve')", timeout=120_000)
+        page.wait_for_selector("[role=status]:has-text('weight curve')")
         killable.kill()
         assert not list(tmp_path.glob("*.tmp*")), "nothing half written is left"
         killable.begin("dome.scantruss")
-        page.wait_for_selector("text=The structure was solved before the last change", timeout=60_000)
+        page.wait_for_selector("text=The structure was solved before the last change")
         tab(page, "Design")
         page.wait_for_selector(f"text={said.strip()}")
         tab(page, "Structure")
@@ -363,31 +375,29 @@ def test_a_server_that_is_killed_loses_nothing_but_what_it_was_at(killable: Serv
         assert (field(page, "section").input_value(), field(page, "most sections").input_value()) == ("CHS139.7x5", "6")
         field(page, "most sections").fill("0")
         page.click("button:has-text('Run')")
-        page.wait_for_selector("text=undo: run", timeout=120_000)
+        page.wait_for_selector("text=undo: run")
         page.wait_for_selector("[role=status]:has-text('ready')")
 
 
-def test_a_click_on_what_is_said_on_the_drawing_reaches_the_drawing(served: tuple[str, Session]) -> None:
-    address, session = served
+def test_a_click_on_what_is_said_on_the_drawing_reaches_the_drawing(served: tuple[str, Session, Any]) -> None:
+    address, session, pages = served
     with open_page(address) as (page, errors):
         page.wait_for_selector("text=Generate")
-        assert session.worker.wait(60)
+        assert session.worker.wait(PATIENCE)
         page.click("text=Crop >> nth=0")
         page.click("button:has-text('Polygon')")
         said = page.locator("[role=alert]:has-text('click the corners')")
-        said.wait_for()
-        page.wait_for_timeout(500)
+        said.element_handle().wait_for_element_state("stable")
+        until_drawn(pages)
         box = said.bounding_box()
         covered = (box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"])
-        for place in ((500, 300), (400, 500), covered):
-            page.mouse.click(*place)
-            page.wait_for_timeout(400)
+        click_corners(page, pages, (500, 300), (400, 500), covered)
         assert until(lambda: len(field(page, "crop").input_value().split(",")) == 6), "three corners of two coordinates"
         assert errors == []
 
 
-def test_a_file_that_is_too_large_is_not_sent(served: tuple[str, Session], tmp_path: Path) -> None:
-    address, session = served
+def test_a_file_that_is_too_large_is_not_sent(served: tuple[str, Session, Any], tmp_path: Path) -> None:
+    address, session, _ = served
     for name, rows in (("large.xyz", 900), ("small.xyz", 400)):
         np.savetxt(tmp_path / name, np.stack([*np.divmod(np.arange(rows), 20), np.zeros(rows)], axis=1), "%.1f")
     with open_page(address) as (page, errors):
@@ -417,11 +427,11 @@ NOTE_FOCUS = """() => {
 }"""
 
 
-def test_keys_alone_reach_everything(served: tuple[str, Session]) -> None:
-    address, session = served
+def test_keys_alone_reach_everything(served: tuple[str, Session, Any]) -> None:
+    address, session, _ = served
     with open_page(address) as (page, errors):
         page.wait_for_selector("text=Generate")
-        assert session.worker.wait(60)
+        assert session.worker.wait(PATIENCE)
         page.evaluate("() => { window.seen = new Set(); }")
         for name in ("Scan", "Design", "Constraints", "Grid", "Compare", "Structure", "Out"):
             page.focus(f"[role=tab]:has-text('{name}')")
@@ -429,8 +439,7 @@ def test_keys_alone_reach_everything(served: tuple[str, Session]) -> None:
             for head in page.locator("[data-with-border] > [aria-expanded=false]:visible").all()[::-1]:
                 head.focus()
                 page.keyboard.press("Enter")
-            page.wait_for_timeout(400)
-            assert page.locator("[data-with-border] > [aria-expanded=false]:visible").count() == 0
+            assert until(lambda: page.locator("[data-with-border] > [aria-expanded=false]:visible").count() == 0)
             for _ in range(2):  # from where it is to the end, and all around
                 for _ in range(200):
                     page.keyboard.press("Tab")
@@ -446,7 +455,7 @@ def test_keys_alone_reach_everything(served: tuple[str, Session]) -> None:
         ):  # ends: it is in the ring that Tab goes around, as was seen
             page.keyboard.press("Shift+Tab")
         page.keyboard.press("Enter")  # the cross begins in the middle of the drawing, where the dome is
-        assert until(lambda: len(session.settings.fixed) == 1) and session.worker.wait(60)
+        assert until(lambda: len(session.settings.fixed) == 1) and session.worker.wait(PATIENCE)
         (place,) = session.settings.fixed
         assert until(lambda: bool(is_orange(shown_colors(page)).sum() > 10))  # its ball is drawn
         page.keyboard.press(" ")
@@ -459,8 +468,8 @@ def test_keys_alone_reach_everything(served: tuple[str, Session]) -> None:
         assert errors == []
 
 
-def test_what_goes_is_shown_within_the_scan(served: tuple[str, Session]) -> None:
-    address, session = served
+def test_what_goes_is_shown_within_the_scan(served: tuple[str, Session, Any]) -> None:
+    address, session, _ = served
     with open_page(address) as (page, errors):
         page.wait_for_selector("text=Generate")
         assert until(lambda: session.grid is not None)
@@ -481,8 +490,8 @@ def test_what_goes_is_shown_within_the_scan(served: tuple[str, Session]) -> None
         assert errors == []
 
 
-def test_a_tap_is_a_click(served: tuple[str, Session]) -> None:
-    address, _ = served
+def test_a_tap_is_a_click(served: tuple[str, Session, Any]) -> None:
+    address, _, pages = served
     with open_page(address) as (page, errors):
         tablet = page.context.browser.new_context(viewport={"width": 1024, "height": 768}, has_touch=True).new_page()
         page.close()
@@ -491,21 +500,21 @@ def test_a_tap_is_a_click(served: tuple[str, Session]) -> None:
         tablet.tap("[role=tab]:has-text('Constraints')")
         tablet.tap("button:has-text('Place by clicks')")
         tablet.wait_for_selector("input[value='place fixed node']")
-        tablet.wait_for_timeout(1000)
+        until_drawn(pages)
         tablet.touchscreen.tap(284, 384)  # the middle of the drawing, where the dome is
         tablet.wait_for_selector("text=undo: fixed node")
         assert errors == []
 
 
-def test_two_browsers_have_a_project_each(served: tuple[str, Session]) -> None:
-    address, session = served
+def test_two_browsers_have_a_project_each(served: tuple[str, Session, Any]) -> None:
+    address, session, _ = served
     with open_page(address) as (page, errors):
         page.set_viewport_size(SMALL)
         page.wait_for_selector("text=dome.scantruss")
         other = page.context.browser.new_page(viewport=SMALL)
         other.goto(address)
         other.wait_for_selector("text=dome-2.scantruss")
-        assert session.worker.wait(60)
+        assert session.worker.wait(PATIENCE)
         before, grid = session.settings, session.grid
         tab(other, "Design")
         other.focus("[role=slider]:visible")

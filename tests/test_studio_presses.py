@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
+from itertools import pairwise
 from pathlib import Path
 from threading import Event
 from typing import Any
 
 import pytest
-from browser import open_page
+from browser import PATIENCE, open_page
 from studio_dome import done, session_of_dome
 from studio_person import field, served_dome, served_session, tab, until
 
@@ -53,7 +54,7 @@ def test_a_press_counts_though_a_run_begins_or_is_refused_meanwhile(served: tupl
     address, session, _ = served
     with open_page(address) as (page, errors):
         page.wait_for_selector("text=Generate")
-        assert session.worker.wait(60)
+        assert session.worker.wait(PATIENCE)
         page.wait_for_selector("text=ready")
 
         def say(stage: str, message: str) -> None:
@@ -78,13 +79,13 @@ def test_a_press_means_the_control_that_it_began_on(served: tuple[str, Session, 
     address, session, _ = served
     with open_page(address) as (page, errors):
         page.wait_for_selector("text=Generate")
-        assert session.worker.wait(60)
+        assert session.worker.wait(PATIENCE)
         page.wait_for_selector("text=ready")
         page.evaluate(
             "window.generate = [...document.querySelectorAll('button')].find((e) => e.textContent === 'Generate')"
         )
         press_while(page, "button:has-text('Generate')", lambda: page.evaluate("generate.style.marginTop = '60px'"))
-        assert until(lambda: session.history.words[0] == "generate") and session.worker.wait(60)
+        assert until(lambda: session.history.words[0] == "generate") and session.worker.wait(PATIENCE)
         box = page.locator("button:has-text('Undo')").bounding_box()
         page.mouse.move(box["x"] + 20, box["y"] + 10)  # a press that is dragged off its control is taken back
         page.mouse.down()
@@ -100,22 +101,24 @@ def test_presses_that_come_at_once_all_count(served: tuple[str, Session, Any]) -
     address, session, _ = served
     with open_page(address) as (page, errors):
         page.wait_for_selector("text=Generate")
-        assert session.worker.wait(60)
+        assert session.worker.wait(PATIENCE)
         tab(page, "Grid")
         page.evaluate("""() => {
           const buttons = [...document.querySelectorAll("button")], named = (words) => buttons.find((e) => e.textContent === words);
           const boxes = [...document.querySelectorAll("input[type=checkbox]")].filter((e) => e.checkVisibility());
           boxes[0].click(); named("Generate").click(); boxes[1].click();
         }""")  # fmt: skip
-        assert until(lambda: session.history.words[0] == "generate", 10.0)
+        assert until(lambda: session.history.words[0] == "generate")
         assert not field(page, "draw members").is_checked() and not field(page, "draw panels").is_checked()
-        assert session.worker.wait(60)
+        assert session.worker.wait(PATIENCE)
+        told = list[tuple[str, str]]()
+        session.listen(lambda: told.append(session.history.words))
         page.evaluate("""() => {
           const buttons = [...document.querySelectorAll("button")], named = (words) => buttons.find((e) => e.textContent === words);
           named("Undo").click(); named("Redo").click(); named("Stop").click();
         }""")  # fmt: skip
-        page.wait_for_timeout(1000)
-        assert session.history.words == ("generate", "")  # taken back and taken again
+        assert until(lambda: any(one[1] == other[0] == "generate" for one, other in pairwise(told)))  # back, and again
+        assert session.history.words == ("generate", "")
         assert errors == []
 
 
@@ -124,7 +127,7 @@ def test_what_was_typed_counts_for_a_press_that_overtakes_it(served: tuple[str, 
     address, session, pages = served
     with open_page(address) as (page, errors):
         page.wait_for_selector("text=Generate")
-        assert session.worker.wait(60)
+        assert session.worker.wait(PATIENCE)
         (client,) = pages.server.get_clients().values()
         pool = client.gui._thread_executor
         submit = pool.submit
@@ -146,7 +149,7 @@ def test_what_was_typed_counts_for_a_press_that_overtakes_it(served: tuple[str, 
         page.click("button:has-text('Generate')")
         assert until(lambda: session.history.words[0] == "generate")
         page.wait_for_timeout(2500)  # until what was held back has come
-        assert session.worker.wait(60) and session.grid is not None and session.grid.settings is not None
+        assert session.worker.wait(PATIENCE) and session.grid is not None and session.grid.settings is not None
         assert not session.state.is_live and session.grid.settings.length == session.settings.length == length
         assert errors == []
 
@@ -158,7 +161,7 @@ def test_a_number_of_the_curve_counts_while_the_trade_goes_on(tmp_path: Path, mo
 
     def in_steps(before: Any, tolerance: float, counts: Any, *others: Any) -> Any:
         if counts[0] == COUNTS[2]:
-            goes_on.wait(60.0)
+            goes_on.wait(PATIENCE)
         return found(before, tolerance, counts, *others)
 
     monkeypatch.setattr(trade_steps, "traded_lengths", in_steps)
@@ -166,19 +169,18 @@ def test_a_number_of_the_curve_counts_while_the_trade_goes_on(tmp_path: Path, mo
         page.wait_for_selector("text=Generate")
         tab(page, "Design")
         page.click("text=Few different parts")
-        page.wait_for_timeout(600)
         field(page, "tolerance").fill("20%")
         page.click("button:has-text('Find what fewer cost')")
         number = COUNTS[1]
         page.wait_for_selector(f"svg [data-low='{number}'] rect", state="attached")
-        page.click(f"svg [data-low='{number}'] rect", timeout=5000)
+        page.click(f"svg [data-low='{number}'] rect")
         goes_on.set()  # another number of lengths comes while the number on the curve is being taken
-        assert until(lambda: session.grid is not None and session.grid.alike is not None, 20.0)
-        assert session.worker.wait(60) and session.grid is not None and session.grid.alike is not None
+        assert until(lambda: session.grid is not None and session.grid.alike is not None)
+        assert session.worker.wait(PATIENCE) and session.grid is not None and session.grid.alike is not None
         assert session.grid.alike.count == number
         page.click("button:has-text('Undo')")
         assert until(lambda: session.grid is not None and session.grid.alike is None)
-        page.click(f"svg [data-low='{number}'] rect", timeout=5000)  # the same again
+        page.click(f"svg [data-low='{number}'] rect")  # the same again
         assert until(lambda: session.grid is not None and session.grid.alike is not None)
         assert errors == []
 
@@ -203,9 +205,8 @@ def test_a_number_that_is_pressed_again_counts_though_its_run_was_stopped(
         page.wait_for_selector("text=Generate")
         tab(page, "Design")
         page.click("text=Few different parts")
-        page.wait_for_timeout(600)
         page.click("svg [data-low='5'] rect")
-        assert until(tried.is_set) and session.worker.wait(60)
+        assert until(tried.is_set) and session.worker.wait(PATIENCE)
         assert session.grid is not None and session.grid.alike is None
         page.wait_for_timeout(500)
         page.click("svg [data-low='5'] rect")

@@ -9,9 +9,9 @@ from typing import Any
 from urllib.parse import urlsplit
 
 import numpy as np
-from browser import open_page
+from browser import PATIENCE, open_page
 from PIL import Image
-from studio_person import SMALL, choose, field, served_dome, tab, until
+from studio_person import SMALL, choose, click_corners, field, served_dome, tab, until, until_drawn
 
 from scantruss.grid.marks import node_marks
 from scantruss.studio.browsers import Browsers
@@ -20,7 +20,7 @@ from scantruss.studio.server import serve_browsers, start_server
 
 def ready(page: Any, session: Any) -> None:
     """Wait until nothing runs."""
-    assert session.worker.wait(60)
+    assert session.worker.wait(PATIENCE)
     page.wait_for_selector("text=Generate")
 
 
@@ -32,9 +32,8 @@ def greens(page: Any) -> int:
 
 
 def say(page: Any, name: str, text: str) -> None:
-    """Type into a field, and wait for what it does."""
+    """Type into a field."""
     field(page, name).fill(text)
-    page.wait_for_timeout(750)
 
 
 def test_what_is_refused_or_old_is_told_from_what_is(tmp_path: Path) -> None:
@@ -86,7 +85,7 @@ def test_what_is_refused_or_old_is_told_from_what_is(tmp_path: Path) -> None:
         assert field(page, "exactly").input_value() == "60" and session.settings.length != 60
         page.click("button:has-text('See all')")
         page.wait_for_selector(".studio-refused", state="detached")
-        assert until(lambda: field(page, "exactly").input_value() == f"{session.settings.length:g}", 10)
+        assert until(lambda: field(page, "exactly").input_value() == f"{session.settings.length:g}")
         tab(page, "Scan")
         page.click("text=Crop")
         say(page, "crop", "box:1,2")
@@ -123,21 +122,19 @@ def test_progress_and_steps_stay_in_sight_and_draw_scan_as_set(tmp_path: Path) -
             assert all(np.diff(places[-1]) > 0)
         assert viewport.evaluate("(each) => each.scrollTop") > 100
         for name in ("Stop", "Undo"):
-            page.locator(f"button:has-text('{name}')").first.click(trial=True, timeout=3000)
+            page.locator(f"button:has-text('{name}')").first.click(trial=True)
         assert errors == []
 
 
 def test_undo_drops_the_last_corner_of_a_polygon_and_one_that_crosses_itself_is_refused(tmp_path: Path) -> None:
-    with served_dome(tmp_path) as (address, session, _), open_page(address) as (page, errors):
+    with served_dome(tmp_path) as (address, session, pages), open_page(address) as (page, errors):
         ready(page, session)
         session.measure(((1.0, 1.0, 1.0), (2.0, 2.0, 1.0)))
         page.click("text=Crop")
         page.click("button:has-text('Polygon')")
         page.wait_for_selector("input[value='corner of crop']")
-        page.wait_for_timeout(500)
-        for x, y in ((300, 250), (550, 250), (550, 500)):
-            page.mouse.click(x, y)
-            page.wait_for_timeout(400)
+        until_drawn(pages)
+        click_corners(page, pages, (300, 250), (550, 250), (550, 500))
         assert until(lambda: field(page, "crop").input_value().count(",") == 5)
         page.mouse.click(420, 150)
         page.wait_for_selector("text=the polygon would cross itself")
@@ -159,11 +156,11 @@ def test_a_page_says_when_the_server_has_gone_and_goes_on_when_it_is_back(tmp_pa
             pass
         assert page.locator("text=Connection lost").count() == 0
         pages.stop()
-        page.wait_for_selector("text=Connection lost", timeout=15_000)
+        page.wait_for_selector("text=Connection lost")
         server, _ = start_server("127.0.0.1", int(urlsplit(address).port or 0))
         again = serve_browsers(server, Browsers(session))
         try:
-            page.wait_for_selector("text=Connection lost", state="detached", timeout=30_000)
+            page.wait_for_selector("text=Connection lost", state="detached")
             page.wait_for_selector("text=dome.scantruss")
             tab(page, "Design")
             length = session.settings.length
