@@ -17,7 +17,7 @@ SHORTEST_SIDE = 0.6  # shortest length of the curve on each side, where another 
 # start and end of the part of the curve on each side that shows where a corner may be [member lengths]
 SIGHT_ALONG_CURVE = (0.1, 0.8)
 CORNER_SPACING = 0.5  # on each side, where a corner turns most; its place lies no farther off [member lengths]
-CORNERS_APART = (
+NEAREST_CORNERS = (
     0.6  # of corners closer together the sharpest stays: the member between them would be too short [member lengths]
 )
 CURVED_FIT_RATIO = 6.0  # a side counts as curved if a quadratic fits it this many times better than a line
@@ -59,7 +59,7 @@ def find_corners(curve: np.ndarray, settings: Settings, coarser: float = 1.0) ->
             if angle > enough and np.linalg.norm(place - curve[i]) < CORNER_SPACING * settings.length:
                 found.append((angle, i, place))
                 break
-    return _apart(found, CORNERS_APART * settings.length)
+    return _apart(found, NEAREST_CORNERS * settings.length)
 
 
 def _peaks(turn: np.ndarray, enough: float) -> np.ndarray:

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 WARN_ASIDE = 0.25  # distance between the boundaries of grid and scan above which it is poor [member lengths]
 # ... above which it is a fault where the grid covers what the scan does not, and how far from triangles its boundary, or from points a
 # member, must lie for that at most and at least; where a grid stops short, the share that it misses decides [member lengths]
-MOST_BEYOND, COVERED_WITHIN, EMPTY_FROM = 0.6, 0.2, 0.25
+MOST_BEYOND, COVERED_WITHIN, EMPTY_FROM = 1.0, 0.2, 0.25
 SPACINGS_OUT = 5.0  # ... and in spacings of the points
 WARN_CUT = (
     0.15  # distance of a corner of the boundary from the nearest node of it above which it is cut off [member lengths]

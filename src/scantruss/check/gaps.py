@@ -36,7 +36,7 @@ POINTS_AROUND_MIDDLE = (
 ACROSS = np.stack(np.meshgrid(*[np.linspace(-0.6, 0.6, 7)] * 2), axis=-1).reshape(
     -1, 2
 )  # places around another [reach]
-MOST_BRIDGED = 0.65  # width of a gap that is open there from which on a grid that bridges it fails [member lengths]
+MOST_BRIDGED = 1.2  # width of a gap that is open there from which on a grid that bridges it fails [member lengths]
 OPEN = 0.1  # distance of the boundary from the nearest point from which on a gap there is open [member lengths]
 
 WIDE_OPENING = 0.5  # longest side from which on an opening that is closed is said [member lengths]

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..scan.clean.outliers import has_outliers, judge_points, too_far_apart
+from ..scan.clean.outliers import has_outliers, judge_points
 from ..scan.cloud import Bounds, bounds_of
 from ..settings import SAMPLE_SPACING, SMOOTH_SAMPLE_SPACING, Settings
 from .given_normals import GivenNormals
@@ -131,10 +131,9 @@ def usual_samples(
     some = thin_dense(points, bounds, radius, spacing) if thinned else points
     found = link_samples(some, radius, length, spacing, given)
     if asked.outlier_distance and (asked.judge_always or has_outliers(found.neighbors)):
-        if asked.judge_always:
-            outlier, sparse = judge_points(points, asked.outlier_distance, length)
-        else:
-            outlier, sparse = np.zeros(len(points), np.bool_), too_far_apart(points, asked.outlier_distance, length)
+        outlier, sparse = judge_points(points, asked.outlier_distance, length)
+        if not asked.judge_always:  # they stand alone for members so short, but are no outliers
+            outlier, sparse = np.zeros_like(outlier), outlier | sparse
         if outlier.any() or sparse.any():
             judged = np.where(outlier, OUTLIER, np.where(sparse, SPARSE_POINT, KEPT)).astype(np.uint8)
             points = np.ascontiguousarray(points[judged == KEPT])

@@ -164,7 +164,7 @@ def sample_surface(cloud: PointCloud, settings: Settings) -> SurfaceSamples:
 
 
 def _has_outliers(cloud: PointCloud) -> bool:
-    """Whether outliers are looked for in a cloud, at every length, as `scan.clean.steps` does; kept as long as the cloud lives."""
+    """Whether outliers are looked for at every length, since `clean` finds some in the cloud; kept as long as the cloud lives."""
     if cloud not in _OUTLIERS_OF_CLOUDS:
         _OUTLIERS_OF_CLOUDS[cloud] = some_stand_alone(cloud.points, cloud.spacing)
     return _OUTLIERS_OF_CLOUDS[cloud]

@@ -111,20 +111,8 @@ def judge_points(points: np.ndarray, distance: float, length: float = np.inf) ->
         alive[found] = False
     doubted = np.flatnonzero(~alive)
     alive[doubted[_on_sheets(near, alive, first_reach, doubted)]] = True
-    return near.in_order(~alive), near.in_order(alive & _far_apart(first_reach, distance, length))
-
-
-def too_far_apart(points: np.ndarray, distance: float, length: float) -> np.ndarray:
-    """Return which points (N,) bool lie too far apart for a member length [scan unit], outliers or not."""
-    if len(points) <= NEIGHBORS_OF_A_POINT:
-        return np.zeros(len(points), np.bool_)
-    near = Nearby.of(points)
-    return near.in_order(_far_apart(near.reach, distance, length))
-
-
-def _far_apart(reach: np.ndarray, distance: float, length: float) -> np.ndarray:
-    """Return which points with some reaches (N,) lie too far apart for a member length, (N,) bool."""
-    return np.asarray(reach > max(FARTHEST_APART * length, distance * float(np.median(reach))))
+    sparse = alive & (first_reach > max(FARTHEST_APART * length, distance * float(np.median(first_reach))))
+    return near.in_order(~alive), near.in_order(sparse)
 
 
 def _on_sheets(near: Nearby, alive: np.ndarray, reach: np.ndarray, doubted: np.ndarray) -> np.ndarray:
