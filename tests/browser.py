@@ -18,12 +18,11 @@ NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable"
 FLAGS = """
 --headless --no-sandbox --no-first-run --no-default-browser-check --remote-debugging-port=0 --disable-dev-shm-usage
 --use-gl=angle --use-angle=swiftshader --enable-unsafe-swiftshader --ignore-gpu-blocklist
---disable-gpu-rasterization --disable-gpu-compositing
 --disable-background-networking --disable-background-timer-throttling --disable-backgrounding-occluded-windows
 --disable-renderer-backgrounding --disable-ipc-flooding-protection --disable-hang-monitor --disable-extensions
 --disable-component-update --disable-breakpad --disable-sync --disable-popup-blocking --hide-scrollbars --mute-audio
 --force-color-profile=srgb --password-store=basic about:blank
-""".split()  # drawn by software, what is no drawing in 3D is painted without OpenGL, which halves the work
+""".split()  # drawn by software
 PATIENCE = 120.0  # of a machine that is busy with other tests: until a browser is there, and of each thing that is waited for in it [s]
 
 

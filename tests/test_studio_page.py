@@ -359,6 +359,7 @@ def test_a_server_that_is_killed_loses_nothing_but_what_it_was_at(killable: Serv
         page.wait_for_selector("text=undo: run")
         figures = page.inner_text("p:has-text('mass without nodes')")
         page.click("text=Sizing and modes")
+        page.wait_for_timeout(500)  # until it has opened
         field(page, "section").fill("CHS139.7x5")
         field(page, "most sections").fill("6")
         page.click("button:has-text('Run')")

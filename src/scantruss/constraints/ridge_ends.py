@@ -5,7 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 LONGEST_BRIDGE = 4.0  # longest gap over which the ends of two ridges are joined [member lengths]
 COSINE_TO_OTHER_END = 0.94  # least cosine of the angle between such an end and the way to the other
@@ -160,6 +159,8 @@ def _ends_of(ridge: Ridge) -> tuple[End, End]:
 
 def _facing(ends: list[End], length: float) -> tuple[int, int] | None:
     """Return the numbers of two ends of two ridges that face each other over the smallest gap, of the two ends of each in turn."""
+    from scipy.spatial import cKDTree  # which grids without ridges do not load
+
     places, ahead = (np.array([getattr(end, name) for end in ends]).reshape(-1, 3) for name in ("place", "ahead"))
     near = cKDTree(places).query_pairs(LONGEST_BRIDGE * length, output_type="ndarray")
     near = near[near[:, 0] // 2 != near[:, 1] // 2]

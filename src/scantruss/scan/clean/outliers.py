@@ -11,7 +11,7 @@ from ...kernels.geometry.components import component_labels
 from ...kernels.scan import outliers as kernels
 from ...runtime.parallel import in_parts, run_in_parts
 from .nearby import NEIGHBORS_OF_A_POINT, REACH_TO, SEARCHES_PER_THREAD, Nearby
-from .thinning import thin_to
+from .thinning import MOST_BOXES, thin_to
 
 ROUNDS_OF_OUTLIERS = 5  # outliers close together hide each other: each round reveals some more
 FARTHEST_REACH = 4.5  # reach, over the upper quartile of all, above which a point is an outlier whatever is near it
@@ -53,6 +53,8 @@ def some_stand_alone(points: np.ndarray, spacing: float) -> bool:
     """
     if spacing <= 0.0:
         return False
+    if np.ptp(points, axis=0).max() > MOST_BOXES * SAMPLES_APART * spacing:  # some lie far from all others
+        return True
     near = Nearby.of(points[thin_to(points, SAMPLES_APART * spacing)])
     far = near.squares > (NEIGHBORS_WITHIN * spacing) ** 2
     return has_outliers(np.where(far, -1, near.neighbors))
