@@ -9,10 +9,10 @@ from steps import boundary_of
 
 import scantruss as st
 from scantruss.runtime import parallel
+from scantruss.scan.clean import streamline
+from scantruss.scan.clean.streamline import is_dense, points_near, streamlined
 from scantruss.scan.cloud import bounds_of
-from scantruss.surface import streamline
 from scantruss.surface.samples import sample_surface
-from scantruss.surface.streamline import is_dense, points_near, streamlined
 
 
 def slow(points: np.ndarray, size: float) -> list[int]:

@@ -305,3 +305,53 @@ def test_a_step_of_one_field_writes_over_nothing_that_waits_in_another() -> None
         asyncio.run(each.note(SimpleNamespace(client=1)))
     assert typed.take() and taken == ["6", "6"]
     in_order.close()
+
+
+class CrossedField(Field):
+    """A field that somebody types into while the server writes there."""
+
+    def __init__(self, typed: str) -> None:
+        self.page = self.kept = ""
+        self.typed = typed
+        self.typing: threading.Thread | None = None
+
+    @property
+    def value(self) -> str:
+        return self.kept
+
+    @value.setter
+    def value(self, text: str) -> None:
+        self.page = text  # sent first, as viser does
+        if self.typing is None:  # what was typed comes after it was sent, before it is kept
+            self.kept, noted = self.typed, threading.Event()
+
+            def tell() -> None:
+                noted.set()
+                asyncio.run(self.note(SimpleNamespace(client=1)))
+
+            self.typing = threading.Thread(target=tell)
+            self.typing.start()
+            noted.wait(30.0)
+            self.typing.join(0.2)  # it waits for who writes
+        self.kept = text
+
+
+def test_what_is_typed_while_the_server_writes_counts_and_is_seen() -> None:
+    in_order, field, taken = InOrder(), CrossedField("6"), list[str]()
+
+    def do(step: Callable[[], None]) -> bool:
+        step()
+        typed.show(field, taken[-1])
+        return True
+
+    def step() -> None:
+        typed.show(field, "0")  # another thread, which shows what was there before
+        taken.append(field.value)
+
+    typed = TypedFields(in_order, do)
+    typed.on_typed(field, step)
+    typed.show(field, "0")
+    assert field.typing is not None
+    field.typing.join()
+    assert typed.take() and taken == ["6"] and field.page == field.value == "6"
+    in_order.close()

@@ -206,6 +206,8 @@ def test_a_person_makes_a_grid_and_a_structure(served: tuple[str, Session, Any],
         page.focus("[role=slider]:visible")
         page.keyboard.press("ArrowRight")
         page.wait_for_selector("text=(quick preview)")
+        slid = f"{session.settings.length:g}"
+        assert until(lambda: field(page, "exactly").input_value() == slid)
         length = float(f"{1.1 * session.settings.length:.3g}")
         field(page, "exactly").fill(f"{length:g}")
         page.click("button:has-text('Generate')")  # at once

@@ -154,6 +154,41 @@ def test_what_was_typed_counts_for_a_press_that_overtakes_it(served: tuple[str, 
         assert errors == []
 
 
+def test_what_the_server_writes_meanwhile_comes_between_no_characters(served: tuple[str, Session, Any]) -> None:
+    address, session, pages = served
+    with open_page(address) as (page, errors):
+        page.wait_for_selector("text=Generate")
+        assert session.worker.wait(PATIENCE)
+        tab(page, "Design")
+        length = field(page, "exactly")
+        (_, view) = next(iter(pages._views.values()))
+
+        def write(text: str) -> None:
+            view.design.length.value = text
+            view.client.flush()
+            assert until(lambda: length.input_value() == text)
+
+        length.select_text()
+        page.evaluate("new Promise((seen) => requestAnimationFrame(() => setTimeout(seen)))")  # the page has seen it
+        write("3.3")
+        page.keyboard.insert_text("1")
+        write("4.4")
+        page.keyboard.type(".2")
+        assert length.input_value() == "1.2"
+        page.keyboard.press("ArrowLeft")
+        page.keyboard.press("Backspace")
+        assert length.input_value() == "12"
+        page.keyboard.press("ControlOrMeta+a")
+        page.evaluate("new Promise((seen) => requestAnimationFrame(() => setTimeout(seen)))")
+        write("5.5")
+        page.keyboard.type("1.7")
+        assert length.input_value() == "1.7"
+        page.click("button:has-text('Generate')")
+        assert until(lambda: session.history.words[0] == "generate") and session.worker.wait(PATIENCE)
+        assert session.settings.length == 1.7 and length.input_value() == "1.7"
+        assert errors == []
+
+
 def test_a_number_of_the_curve_counts_while_the_trade_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("viser", reason="viser is not installed")
     session = session_of_dome(tmp_path, 10.0)

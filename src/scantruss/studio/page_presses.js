@@ -1,4 +1,4 @@
-// No press is lost, however busy the page is.
+// No press is lost, and nothing that is typed, however busy the page is.
 
 // A press means the control it began on, wherever that has gone before the pointer comes up: a browser makes no click of it then.
 const CONTROLS = "button, input[type=checkbox], [role=button], [role=option]";
@@ -33,4 +33,29 @@ addEventListener("click", (event) => {
     control.click();
     passes = null;
   }, waits);
+}, true);
+
+// What the server writes into a field in which a person is typing moves the caret, or comes between two keys: before the next character
+// the field is as the person has left it.
+const TYPES_ON = 3000;  // after the last character [ms]
+const MOVES_CARET = /^(Arrow|Home|End|Page|Tab|Escape)/;
+let chosen = null, typed = null;  // the field whose whole text is selected; what was typed last, and where the caret stood
+const isText = (field) => field.matches?.("input[type=text], input:not([type]), textarea");
+addEventListener("select", ({ target: field }) => {
+  if (isText(field)) chosen = field.selectionEnd - field.selectionStart === field.value.length ? field : null;
+}, true);
+for (const kind of ["keydown", "pointerdown", "focusout"]) {
+  addEventListener(kind, (event) => {
+    if (kind !== "keydown" || MOVES_CARET.test(event.key)) chosen = typed = null;
+  }, true);
+}
+addEventListener("input", ({ target: field }) => {
+  chosen = null;
+  typed = isText(field) ? { field, text: field.value, caret: field.selectionStart, at: performance.now() } : null;
+}, true);
+addEventListener("beforeinput", ({ target: field }) => {
+  if (field === chosen && field.selectionStart === field.selectionEnd) field.select();
+  if (field !== typed?.field || field.value === typed.text || performance.now() - typed.at > TYPES_ON) return;
+  Object.getOwnPropertyDescriptor(Object.getPrototypeOf(field), "value").set.call(field, typed.text);
+  field.setSelectionRange(typed.caret, typed.caret);
 }, true);

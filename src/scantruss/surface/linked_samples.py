@@ -10,10 +10,10 @@ from ..kernels.geometry.boxes import SearchBoxes, new_boxes
 from ..kernels.surface import normals as normal_kernels
 from ..kernels.surface import samples as kernels
 from ..runtime.parallel import run_in_parts
+from ..scan.clean.streamline import is_dense, streamlined
 from ..scan.cloud import Bounds, bounds_of
 from ..scan.normals import NORMALS_PER_THREAD
 from .given_normals import NO_NORMALS, GivenNormals
-from .streamline import is_dense, streamlined
 
 LINKS_OF_A_SAMPLE = 12  # most links of a sample
 LINK_BOX = 4.0  # size d_B of the search boxes of the samples (Eq. 1), in which they are linked [sample radii]

@@ -14,6 +14,7 @@ from ..kernels.surface.local_surface import Surface
 from ..runtime.parallel import in_parts
 from ..scan.clean.duplicates import find_repeated, has_repeats
 from ..scan.clean.outliers import some_stand_alone
+from ..scan.clean.streamline import points_near
 from ..scan.cloud import Bounds, PointCloud, bounds_of
 from ..scan.normals import mean_normals
 from ..settings import SAMPLE_SPACING, SMOOTH_SAMPLE_SPACING, Settings
@@ -41,7 +42,6 @@ from .pieces import chosen_pieces, large_pieces, number_pieces, sample_areas
 from .rods import lengths_of_rods, pieces_of_rods, rod_points
 from .shape import check_is_surface, layers_of_surface
 from .size_field import length_field
-from .streamline import points_near
 from .supports import support_samples
 
 BESIDE_SAMPLES = 1.5  # distance from points of the boundary within which all points are used [`sample_spacing`]

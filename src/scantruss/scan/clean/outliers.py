@@ -8,10 +8,13 @@ from __future__ import annotations
 import numpy as np
 
 from ...kernels.geometry.components import component_labels
+from ...kernels.geometry.kd_tree import nearest_of_places
 from ...kernels.scan import outliers as kernels
 from ...runtime.parallel import in_parts, run_in_parts
-from .nearby import NEIGHBORS_OF_A_POINT, REACH_TO, SEARCHES_PER_THREAD, Nearby
-from .thinning import MOST_BOXES, thin_to
+from ..cloud import bounds_of
+from .nearby import NEIGHBORS_OF_A_POINT, REACH_TO, SEARCHES_PER_THREAD, Nearby, build_kd_tree
+from .streamline import streamlined
+from .thinning import MOST_BOXES, number_in_boxes
 
 ROUNDS_OF_OUTLIERS = 5  # outliers close together hide each other: each round reveals some more
 FARTHEST_REACH = 4.5  # reach, over the upper quartile of all, above which a point is an outlier whatever is near it
@@ -55,9 +58,16 @@ def some_stand_alone(points: np.ndarray, spacing: float) -> bool:
         return False
     if np.ptp(points, axis=0).max() > MOST_BOXES * SAMPLES_APART * spacing:  # some lie far from all others
         return True
-    near = Nearby.of(points[thin_to(points, SAMPLES_APART * spacing)])
-    far = near.squares > (NEIGHBORS_WITHIN * spacing) ** 2
-    return has_outliers(np.where(far, -1, near.neighbors))
+    some = points[streamlined(points, bounds_of(points), SAMPLES_APART * spacing)]
+    within = NEIGHBORS_WITHIN * spacing
+    box = number_in_boxes(some, within / np.sqrt(3.0))  # as wide as that points of a box are no farther apart
+    in_doubt = some[np.bincount(box)[box] <= ENOUGH_AROUND]
+    if len(in_doubt) <= LONE_SHARE * len(some):
+        return False
+    squares, which = np.empty(len(in_doubt)), np.empty(len(in_doubt), np.int64)
+    nearest_of_places(build_kd_tree(some), in_doubt, ENOUGH_AROUND + 1, squares, which)  # the first is the point itself
+    alone = (squares > within * within).sum() if len(some) > ENOUGH_AROUND else len(some)
+    return bool(alone > LONE_SHARE * len(some))
 
 
 def find_outliers(points: np.ndarray, distance: float) -> np.ndarray:

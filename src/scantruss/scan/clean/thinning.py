@@ -18,15 +18,20 @@ def thin_to(points: np.ndarray, spacing: float) -> np.ndarray:
         raise InputError(
             f"spacing {spacing:g} is too small for a scan of {extent:.4g}; use at least {extent / MOST_BOXES:.2g}"
         )
-    box = np.floor((points - points.min(axis=0)) / spacing).astype(np.int64)
-    key = (box[:, 0] << 42) | (box[:, 1] << 21) | box[:, 2]
-    order = np.argsort(key, kind="stable")
-    first = np.flatnonzero(np.r_[True, np.diff(key[order]) != 0])
-    count = np.diff(np.r_[first, len(points)])
+    box = number_in_boxes(points, spacing)
+    order = np.argsort(box, kind="stable")
+    count = np.bincount(box)
+    first = np.cumsum(count) - count
     mean = np.add.reduceat(points[order], first, axis=0) / count[:, None]
-    group = np.repeat(np.arange(len(first)), count)
+    group = box[order]
     away = ((points[order] - mean[group]) ** 2).sum(axis=1)
     best = np.lexsort((away, group))[first]
     stays = np.zeros(len(points), np.bool_)
     stays[order[best]] = True
     return stays
+
+
+def number_in_boxes(points: np.ndarray, size: float) -> np.ndarray:
+    """Return the number of each point's search box among those that hold points (N,) int64; at most `MOST_BOXES` along an axis."""
+    box = np.floor((points - points.min(axis=0)) / size).astype(np.int64)
+    return np.unique((box[:, 0] << 42) | (box[:, 1] << 21) | box[:, 2], return_inverse=True)[1]

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..kernels.geometry.boxes import new_boxes
-from ..kernels.scan import nearby
-from ..kernels.scan import streamline as kernels
-from ..runtime.parallel import in_parts, processors
-from ..scan.cloud import Bounds
+from ...kernels.geometry.boxes import new_boxes
+from ...kernels.scan import nearby
+from ...kernels.scan import streamline as kernels
+from ...runtime.parallel import in_parts, processors
+from ..cloud import Bounds
 
 DENSE_SPACING = 0.35  # point spacing below which a scan is streamlined [box size]
 CHOSEN_POINTS_PER_THREAD = 200_000  # fewest points worth a thread of their own
