@@ -54,7 +54,10 @@ addEventListener("input", ({ target: field }) => {
   typed = isText(field) ? { field, text: field.value, caret: field.selectionStart, at: performance.now() } : null;
 }, true);
 addEventListener("beforeinput", ({ target: field }) => {
-  if (field === chosen && field.selectionStart === field.selectionEnd) field.select();
+  if (field === chosen) {
+    if (field.selectionStart === field.selectionEnd) field.select();
+    return;
+  }
   if (field !== typed?.field || field.value === typed.text || performance.now() - typed.at > TYPES_ON) return;
   Object.getOwnPropertyDescriptor(Object.getPrototypeOf(field), "value").set.call(field, typed.text);
   field.setSelectionRange(typed.caret, typed.caret);
