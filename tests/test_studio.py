@@ -11,10 +11,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from studio_dome import done, session_of_dome
 
 import scantruss as st
 from scantruss.cli.main import main
 from scantruss.pipeline import grid_from_cloud
+from scantruss.report.advice import Advice
 from scantruss.runtime.progress import Progress
 from scantruss.studio.in_order import InOrder
 from scantruss.studio.project import read_project
@@ -355,3 +357,17 @@ def test_what_is_typed_while_the_server_writes_counts_and_is_seen() -> None:
     field.typing.join()
     assert typed.take() and taken == ["6"] and field.page == field.value == "6"
     in_order.close()
+
+
+def test_the_length_that_is_tried_is_that_of_info_and_can_be_undone(tmp_path: Path) -> None:
+    session = session_of_dome(tmp_path, 10.0)
+    done(session)
+    cloud, before = session.cloud, session.settings.length
+    assert cloud is not None
+    session.try_lengths()
+    done(session)
+    assert session.settings.length == Advice(cloud, session.settings).suggest() != before
+    assert session.grid is not None and session.grid.certificate is not None and session.grid.certificate.passed
+    assert session.grid.settings is not None and session.grid.settings.length == session.settings.length
+    session.undo()
+    assert session.settings.length == before

@@ -13,6 +13,7 @@ from ..constraints.fixed_nodes import check_positions
 from ..errors import InputError
 from ..export.model import Model
 from ..pipeline import grid_from_cloud
+from ..report.advice import Advice
 from ..runtime.progress import Progress, WatchedProgress
 from ..scan.cloud import PointCloud
 from ..scan.member_length import check_length, exact_range
@@ -86,6 +87,32 @@ class Session(TradeSteps):
         if self.cloud is not None:
             check_length(self.cloud, settings)
         self.set("length", length=settings.length)
+
+    def try_lengths(self) -> None:
+        """Try lengths by quick grids, as ``scantruss info`` does, take the one that it suggests, and show its grid.
+
+        Raises
+        ------
+        InputError
+            There is no scan; or, once it is tried, no length gives a grid that passes.
+        """
+        if self.cloud is None:
+            raise InputError("there is no scan yet; open one")
+        self.worker.ask(self._try_lengths)
+
+    def _try_lengths(self, progress: Progress) -> None:
+        cloud, turn = self.cloud, self._turn
+        assert cloud is not None
+        advice = Advice(cloud, self.settings, lambda stage, share: progress(f"trying lengths: {stage}", share))
+        length = advice.suggest()
+        if not advice.passes:
+            raise InputError("no length that was tried gives a grid that passes; Generate says what is in the way")
+        with self._lock:
+            if turn != self._turn:
+                return
+            self.change("length tried", settings=self.state.with_main_length(length))
+        self.save()
+        self._make(EFFORT_OF_PREVIEW, progress, live=True)
 
     def paint(self, made: Settings) -> None:
         """Take settings with other lengths at some places; the length elsewhere stays."""

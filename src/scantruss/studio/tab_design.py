@@ -29,6 +29,9 @@ class DesignTab:
         self.view, session, step = view, view.session, view.step
         self.slider = gui.add_slider("length", 0.5, 2.0, 0.01, 1.0, hint="a quick grid is made while it moves")
         self.length = gui.add_text("exactly", "1", hint="any length, in the unit of the scan")
+        tries = gui.add_button(
+            "Try lengths", hint="makes quick grids until one passes, as scantruss info does, and takes its length"
+        )
         self.figures = gui.add_markdown("")
         self.cells = CellsTool(view, gui)
         self.effort = gui.add_dropdown("effort", EFFORTS, hint="of Generate")
@@ -43,6 +46,7 @@ class DesignTab:
             self.trade = TradeTool(view, gui)
         self.slider.on_update(view.slid(self._slide))
         view.typed(self.length, self._typed)
+        tries.on_click(step(session.try_lengths))
         self.effort.on_update(step(lambda: session.set_quietly("effort", effort=self.effort.value)))
         self.prefer.on_update(step(lambda: session.set("prefer", prefer=PREFERENCES[self.prefer.value])))
 

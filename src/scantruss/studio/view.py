@@ -41,6 +41,7 @@ NATURAL_VIEW = 0.65  #: of the camera, upright [rad]
 PLAN_VIEW = 0.08  #: the same of a plan, seen from so far that heights hardly matter [rad]
 PLAN_FAR = 1.3  #: of the camera above a plan, so that all of it is seen [distance at which it fills the view]
 PANEL_WIDTH, USUAL_WIDTH = 452, 1280  #: of the panel; of a page that has not said its own [pixel]
+LEAST_PANEL, LARGEST_PANEL = 360, 0.5  #: on narrow pages: of the panel [pixel]; of the page
 LEAST_DRAWING = 0.4  #: of a page that the drawing has beside the panel, which lies over it on narrower ones
 FIRST_SEEN_FROM = np.array([0.8, -1.4, 0.9])  #: direction from which the scan is seen first
 STEP_BUTTONS = {
@@ -68,9 +69,8 @@ class StudioView(Presses):
         self.client = client
         self.scene = Scene(client.scene)
         whole = float(client.camera.image_width or USUAL_WIDTH)
-        self._width = max(
-            whole - PANEL_WIDTH, LEAST_DRAWING * whole
-        )  # of the drawing once the panel is beside it [pixel]
+        panel = min(PANEL_WIDTH, max(LEAST_PANEL, LARGEST_PANEL * whole))
+        self._width = max(whole - panel, LEAST_DRAWING * whole)  # of the drawing once the panel is beside it [pixel]
         self._lock = RLock()
         self._closed = False
         self._shown: StudioState | None = None
@@ -85,7 +85,7 @@ class StudioView(Presses):
         gui = client.gui
         with client.atomic():
             gui.main_panel.dock_right()
-            gui.main_panel.set_width(PANEL_WIDTH)
+            gui.main_panel.set_width(panel)
             gui.configure_theme(show_share_button=False, show_logo=False, control_width="large")
             gui.add_html(PANEL_STYLE)
             self.head = Head(gui)
