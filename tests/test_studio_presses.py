@@ -5,7 +5,6 @@ Each test holds back what a loaded machine may hold back, at the worst moment.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
@@ -122,33 +121,19 @@ def test_presses_that_come_at_once_all_count(served: tuple[str, Session, Any]) -
         assert errors == []
 
 
-def test_what_was_typed_counts_for_a_press_that_overtakes_it(served: tuple[str, Session, Any]) -> None:
-    """Viser calls functions side by side: what a press calls may come before what the text called."""
-    address, session, pages = served
+def test_what_was_typed_counts_for_a_press_before_its_pause_is_over(
+    served: tuple[str, Session, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("scantruss.studio.typed_fields.TYPING_PAUSE", PATIENCE)
+    address, session, _ = served
     with open_page(address) as (page, errors):
         page.wait_for_selector("text=Generate")
         assert session.worker.wait(PATIENCE)
-        (client,) = pages.server.get_clients().values()
-        pool = client.gui._thread_executor
-        submit = pool.submit
-
-        def late(take: Any, event: Any) -> Any:
-            if getattr(event.target, "label", "") != "exactly":
-                return submit(take, event)
-
-            def wait() -> None:
-                time.sleep(1.5)
-                take(event)
-
-            return submit(wait)
-
-        pool.submit = late
         tab(page, "Design")
         length = float(f"{1.3 * session.settings.length:.3g}")
         field(page, "exactly").fill(f"{length:g}")
         page.click("button:has-text('Generate')")
         assert until(lambda: session.history.words[0] == "generate")
-        page.wait_for_timeout(2500)  # until what was held back has come
         assert session.worker.wait(PATIENCE) and session.grid is not None and session.grid.settings is not None
         assert not session.state.is_live and session.grid.settings.length == session.settings.length == length
         assert errors == []
