@@ -21,7 +21,14 @@ from scantruss.constraints.ridge_ends import Ridge, join_ends
 from scantruss.constraints.ridges import find_ridges
 from scantruss.errors import FrontError
 from scantruss.kernels.geometry.quadric import COLUMNS, WEIGHT
-from scantruss.kernels.surface.ridges import FOUND, TERMS, fit_fold, fold_error, turned_frame
+from scantruss.kernels.surface.ridges import (
+    FOUND,
+    TERMS,
+    fit_fold,
+    fold_error,
+    turned_frame,
+)
+from scantruss.kernels.surface.turned_folds import smooth_part, turned_fold_error
 from scantruss.surface.samples import sample_surface
 
 SIZE = 5.0  # member length of all shapes here
@@ -291,6 +298,22 @@ def test_the_error_of_a_fold_is_that_of_least_squares(seed: int, folded: bool) -
     solution, squares, *_ = np.linalg.lstsq(root[:, None] * terms, root * h, rcond=None)
     assert error == pytest.approx(float(squares[0]), rel=1e-4)
     assert np.allclose(matrix[: terms.shape[1], TERMS], solution, rtol=1e-3, atol=1e-3)
+
+
+@pytest.mark.kernels
+@given(st.integers(0, 10_000))
+def test_the_error_of_a_turned_fold_is_the_same_once_the_quadrics_are_taken_out(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    buffer = np.zeros((60, COLUMNS))
+    buffer[:, :3] = rng.uniform(-1, 1, (60, 3)) * [0.8, 0.8, 0.3]
+    buffer[:, WEIGHT] = rng.uniform(0.1, 1, 60)
+    across, normal, radius = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0), rng.uniform(0.7, 1.0)
+    table, squares = smooth_part(buffer, 60, turned_frame(across, normal, 0.0), radius)
+    matrix = np.empty((TERMS, TERMS + 1))
+    for rounding in (0.0, 0.1, 0.3):
+        angle, shift = rng.uniform(-1.5, 1.5), rng.uniform(-0.4, 0.4)
+        whole = fold_error(buffer, 60, turned_frame(across, normal, angle), shift, radius, True, rounding, matrix)
+        assert turned_fold_error(table, squares, angle, shift, rounding) == pytest.approx(whole, rel=1e-4)
 
 
 @pytest.mark.kernels

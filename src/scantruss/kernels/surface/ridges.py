@@ -18,6 +18,7 @@ from ...runtime.jit import kernel
 from ..geometry.quadric import WEIGHT, solve
 from ..geometry.vectors import Vector, along, cross, dot, norm, row, subtract, unit
 from .local_surface import Surface, flood, gather_points, walk
+from .turned_folds import smooth_part, turned_fold_error
 
 EITHER_SIDE = -2.0  # no cosine is so low: the points of both sides of a ridge count
 TERMS = 8  # terms of the folded surface: k0 to k7
@@ -246,21 +247,13 @@ def keep_folded(
 
 
 @kernel
-def best_rounding(
-    buffer: np.ndarray,
-    taken: int,
-    frame: tuple[Vector, Vector, Vector],
-    shift: float,
-    radius: float,
-    length: float,
-    matrix: np.ndarray,
-) -> tuple[float, float]:
-    """Error of the folds along a line of the sharpest rounding that fits, and that rounding [radius]."""
+def best_rounding(table: np.ndarray, squares: float, angle: float, shift: float, member: float) -> tuple[float, float]:
+    """Error of the folds along a line of the sharpest rounding that fits, and that rounding [radius]; member : its length [radius]."""
     least, best = np.inf, 0.0
     for w in ROUNDINGS:
-        error = fold_error(buffer, taken, frame, shift, radius, True, w * length / radius, matrix)
+        error = turned_fold_error(table, squares, angle, shift, w * member)
         if error < CLEARLY * least:
-            least, best = error, w * length / radius
+            least, best = error, w * member
     return least, best
 
 
@@ -282,6 +275,7 @@ def fit_fold(
     if taken < 30 or norm(c) < 0.5:
         return False
     matrix = np.empty((TERMS, TERMS + 1))
+    table, squares = smooth_part(buffer, taken, turned_frame(c, n, 0.0), radius)
     angle = shift = 0.0
     reach, swing = 0.4, 0.35
     least = np.inf
@@ -289,17 +283,15 @@ def fit_fold(
     for turn in range(FOLD_FITS):
         if turn == SEARCHES and least < np.inf:
             rounding = 0.0
-            least = fold_error(buffer, taken, turned_frame(c, n, angle), shift, radius, True, rounding, matrix)
+            least = turned_fold_error(table, squares, angle, shift, rounding)
         if turn == FOLD_FITS - 1 and least < np.inf:
-            frame = turned_frame(c, n, angle)
-            least, rounding = best_rounding(buffer, taken, frame, shift, radius, surface.length, matrix)
+            least, rounding = best_rounding(table, squares, angle, shift, surface.length / radius)
         at_angle, at_shift = angle, shift
         for i in range(TURNS):
             for j in range(SHIFTS):
                 a = at_angle + swing * (2.0 * i / (TURNS - 1) - 1.0)
                 b = at_shift + reach * (2.0 * j / (SHIFTS - 1) - 1.0)
-                frame = turned_frame(c, n, a)
-                error = fold_error(buffer, taken, frame, b, radius, True, rounding, matrix)
+                error = turned_fold_error(table, squares, a, b, rounding)
                 if error < least:
                     least, angle, shift = error, a, b
         if turn != SEARCHES:  # a sharp fold may lie a little beside
