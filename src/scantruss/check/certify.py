@@ -27,6 +27,7 @@ from .irregular import count_irregular
 from .left_out import closed_holes, first_and_more, parts_left_out
 from .limits import NOISES_OFF, ROUNDED_BY, limits_of, places_to_look_at, widened_limits
 from .sheets import cut_apart, faults_on_sheets, nodes_of_samples
+from .slits import narrow_gaps
 from .unfollowed import mostly_unfollowed, unfollowed_parts
 
 if TYPE_CHECKING:
@@ -109,8 +110,11 @@ class Judged:
         roughness = NOISES_OFF * offsets.get("node_scatter", 0.0) if rough else 0.0
         rounded = _rounded(found, followed, members, roughness)
         places = places_to_look_at(self.certificate, missed_at, rounded)
-        holes = [*closed_holes(samples, boundary), *first_and_more(gaps)]
-        lids = openings_closed(holes, bridged, length, grid.unit)
+        closed = closed_holes(samples, boundary)
+        slits, narrow, parts = narrow_gaps(grid, samples, found, [*closed, *gaps], length)
+        bridged = [each for each in bridged if each.kind == "bridged" or not each.is_said_by(parts)]
+        holes = [*closed, *first_and_more([*(gap for gap in gaps if gap not in parts), *slits])]
+        lids = openings_closed(holes, [*bridged, *narrow], length, grid.unit)
         return replace(
             self.certificate,
             left_out=(*self.certificate.left_out, *holes),
@@ -120,6 +124,7 @@ class Judged:
                 *apart,
                 *off_sheets,
                 *(each for each in bridged if each.kind == "gap"),
+                *narrow,
                 *lids,
                 *doubtful,
                 *aside,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields
 from typing import TYPE_CHECKING, Any
 
@@ -30,6 +31,10 @@ class Fault:
     words: str
     where: Place | None = None  #: a place in the scan's own frame [scan unit], the worst
     also: tuple[Place, ...] = ()  #: more such places
+
+    def is_said_by(self, parts: Sequence[LeftOut]) -> bool:
+        """Whether each of its places is one of those of some parts."""
+        return {self.where, *self.also} <= {part.where for part in parts}
 
 
 @dataclass(frozen=True)
