@@ -76,3 +76,45 @@ def test_the_grid_of_a_sail_with_a_cut_says_so(length: float) -> None:
     grid = grid_from_points(points, st.Settings(length=length, effort="quick"))
     said = [fault for fault in known(grid.certificate).warnings if fault.kind in ("gap", "closed")]
     assert any(fault.where and abs(fault.where[0] - 1.0) < 0.5 for fault in said)
+
+
+def star() -> np.ndarray:
+    """A shell with five slender arms."""
+    rng = np.random.default_rng(11)
+    turn, radius = rng.uniform(0.0, 2.0 * np.pi, 160_000), 14.0 * np.sqrt(rng.uniform(0.0, 1.0, 160_000))
+    inside = radius < 5.0 + 8.0 * np.maximum(np.cos(5.0 * turn), 0.0) ** 6
+    turn, radius = turn[inside][:40_000], radius[inside][:40_000]
+    points = np.column_stack([radius * np.cos(turn), radius * np.sin(turn), 4.0 - 0.02 * radius**2])
+    return points + rng.normal(0.0, 0.005, points.shape)
+
+
+@pytest.mark.parametrize(("bays", "passes"), [(1, True), (5, False)])
+def test_a_grid_that_covers_the_bays_of_a_plate_fails_and_one_with_a_small_bay_does_not(
+    bays: int, passes: bool
+) -> None:
+    points = sheet(13, 8, 0.05)
+    middles = 2.0 * np.arange(bays) - (bays - 1.0)
+    in_bay = (abs(points[:, :1] - middles) < 0.45).any(axis=1) & (points[:, 1] < (3.0 if bays > 1 else -1.0))
+    found = certified(points[~in_bay])
+    assert any("covers nothing on" in fault.words for fault in found.faults) != passes
+
+
+@pytest.mark.parametrize(("height", "named"), [(0.5, True), (0.2, False)])
+def test_a_slender_peak_that_members_cut_off_is_named_with_its_place(height: float, named: bool) -> None:
+    points = sheet(13, 8, 0.03, keep=lambda x, y: (abs(y) < 3.4) & (abs(x - y / 3**0.5) < 4.0))
+    points[:, 2] += height * np.exp(-np.hypot(points[:, 0] - 0.5, points[:, 1] - 0.3) / 0.25)
+    loose = np.random.default_rng(0).uniform([-2.0, -3.0, 0.3], [2.0, 3.0, 0.5], (40, 3))
+    found = [fault for fault in certified(np.concatenate([points, loose])).warnings if fault.kind == "peak"]
+    assert bool(found) == named
+    if named:
+        assert known(found[0].where) == pytest.approx((0.5, 0.3, height), abs=0.1) and not found[0].also
+
+
+@compiled_only
+def test_no_grid_of_a_star_passes_that_spans_from_arm_to_arm() -> None:
+    try:
+        grid = grid_from_points(star(), st.Settings(length=7.0, effort="quick"))
+    except st.CertificateError as error:
+        assert "covers nothing" in str(error) or known(error.where)
+        return
+    assert not [each for each in known(grid.certificate).warnings if each.kind == "gap"]

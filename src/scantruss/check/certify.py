@@ -15,6 +15,7 @@ from ..errors import CertificateError
 from ..grid.certificate import Certificate, Fault, Spread, Worst, place_of
 from ..runtime.parallel import side_by_side
 from ..surface.chosen_samples import KEPT, LIMB, SLIT
+from .bare import mostly_bare
 from .boundaries import boundary_beyond, places_aside
 from .crossings import find_crossings
 from .defects import faults_in_space, faults_of_topology
@@ -28,7 +29,7 @@ from .left_out import closed_holes, first_and_more, parts_left_out
 from .limits import NOISES_OFF, ROUNDED_BY, limits_of, places_to_look_at, widened_limits
 from .sheets import cut_apart, faults_on_sheets, nodes_of_samples
 from .slits import narrow_gaps
-from .unfollowed import mostly_unfollowed, unfollowed_parts
+from .unfollowed import mostly_unfollowed, rounded_peaks, unfollowed_parts
 
 if TYPE_CHECKING:
     from ..boundary.find import Boundary
@@ -97,7 +98,7 @@ class Judged:
         followed = _to_follow(samples)
         missed_at = place_of(samples.scan[_missed(found, followed, members)] + samples.origin)
         rough = samples.moved  # then its roughness is the scatter
-        offsets, (gaps, bridged), doubtful, aside, beyond, beside, apart, off_sheets = side_by_side(
+        offsets, (gaps, bridged), doubtful, aside, beyond, beside, apart, off_sheets, bare, peaks = side_by_side(
             lambda: _offsets(grid, samples, length),
             lambda: bridged_gaps(grid, samples, boundary, length),
             lambda: [] if settings.boundary else doubtful_places(grid, samples, length),
@@ -106,6 +107,8 @@ class Judged:
             lambda: [] if rough else unfollowed_parts(grid, samples, found, followed, members),
             lambda: cut_apart(grid, samples, found, length),
             lambda: nodes_off_sheets(grid, samples, length),
+            lambda: mostly_bare(grid, samples, found, length),
+            lambda: [] if rough else rounded_peaks(grid, samples, found, followed, members),
         )
         roughness = NOISES_OFF * offsets.get("node_scatter", 0.0) if rough else 0.0
         rounded = _rounded(found, followed, members, roughness)
@@ -118,7 +121,7 @@ class Judged:
         return replace(
             self.certificate,
             left_out=(*self.certificate.left_out, *holes),
-            faults=(*self.certificate.faults, *beyond, *(each for each in bridged if each.kind == "bridged")),
+            faults=(*self.certificate.faults, *beyond, *bare, *(each for each in bridged if each.kind == "bridged")),
             warnings=(
                 *self.certificate.warnings,
                 *apart,
@@ -129,6 +132,7 @@ class Judged:
                 *doubtful,
                 *aside,
                 *beside,
+                *peaks,
                 *places,
             ),
             **offsets,

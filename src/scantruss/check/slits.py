@@ -26,10 +26,13 @@ if TYPE_CHECKING:
 
 FINEST_PLACES = 16  # places along a side of a triangle at most
 MOST_PLACES_OF_GRID = 2_000_000  # places that are looked at in all
-MOST_FAR_PLACES = 20_000  # of those far from all points, how many are looked at closely
+MOST_FAR_PLACES = 10_000  # of those far from all points, how many are looked at closely
 # share of the places of a triangle that are nearer to a point than its usual distance, and least half width of a gap in those: at
 # random points one place in a million is as far, between lines of a scanner none
 SHARE_NEARER, UNUSUAL = 0.5, 4.5
+FEWEST_ON_SIDE = 6  # places along a side of a triangle at least
+# half width from which on a gap is a wide one, which is looked for elsewhere [member lengths]
+WIDEST_HALF = 0.4
 LEAST_STEPS = 0.7  # least half width [steps between places]
 WAYS_AROUND = 12  # in which points are looked for around a place, an even number
 TO_MIDDLE = 0.35  # step towards the middle of a gap [half widths]
@@ -43,7 +46,7 @@ FEWEST_IN_GAP = 4  # in one gap
 
 
 @dataclass(frozen=True, eq=False)
-class _Feet:
+class FeetOnGrid:
     """Points of a scan, each at its foot on the nearest triangle: neither noise nor a bend between nodes keeps them off the grid."""
 
     points: np.ndarray  #: (N, 3)
@@ -77,12 +80,15 @@ def narrow_gaps(
     known : holes and gaps that are said already
     length : desired member length [scan unit]
     """
-    feet = _feet(grid, samples, found, length)
+    feet = feet_on(grid, samples, found, length)
     if feet is None:
         return [], [], []
     members = np.full(len(grid.nodes), length) if grid.desired is None else grid.desired
     members = members[grid.triangles].mean(axis=1)
-    places, owner, half, step = _far_places(grid, feet, float(np.median(grid.lengths)))
+    near = np.flatnonzero(found.triangles <= WIDEST_HALF * members)  # others lie over closed holes and wide gaps
+    if not len(near):
+        return [], [], []
+    places, owner, half, step = _far_places(grid, near, members[near], feet)
     if len(places) and samples.measured < len(samples.surface.mean):
         measured = ~is_over_holes(places, samples)
         places, owner, half = places[measured], owner[measured], half[measured]
@@ -110,7 +116,7 @@ def narrow_gaps(
     return [gap for gap, _ in gaps], warnings, parts
 
 
-def _feet(grid: Grid, samples: SurfaceSamples, found: Distances, length: float) -> _Feet | None:
+def feet_on(grid: Grid, samples: SurfaceSamples, found: Distances, length: float) -> FeetOnGrid | None:
     """Return the points near the grid at their feet; None where there are none."""
     near = np.flatnonzero((samples.judged == KEPT) & (found.scan <= 0.5 * length))
     if not len(near):
@@ -119,7 +125,7 @@ def _feet(grid: Grid, samples: SurfaceSamples, found: Distances, length: float) 
     points, triangle = samples.scan[near], found.triangle[near]
     height = ((points - corner[triangle]) * normal[triangle]).sum(axis=1)
     points = np.ascontiguousarray(points - height[:, None] * normal[triangle])
-    return _Feet(points, boxes_of(points, max(0.1 * length, 2.0 * samples.spacing)), samples.spacing)
+    return FeetOnGrid(points, boxes_of(points, max(0.1 * length, 2.0 * samples.spacing)), samples.spacing)
 
 
 def normals_of(grid: Grid) -> np.ndarray:
@@ -129,26 +135,30 @@ def normals_of(grid: Grid) -> np.ndarray:
     return normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
 
 
-def _far_places(grid: Grid, feet: _Feet, member: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return places on the triangles that are unusually far from all points (P, 3), a triangle and the distance of each (P,).
+def _far_places(
+    grid: Grid, near: np.ndarray, members: np.ndarray, feet: FeetOnGrid
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return places on some triangles (K,) that are unusually far from points (P, 3), a triangle and the distance of each (P,).
 
-    The last array is the distance between places of each triangle (T,).
+    The last array is the distance between places of each of all triangles (T,); members : (K,) desired lengths [scan unit].
     """
-    count = len(grid.triangles)
-    along = min(FINEST_PLACES, math.ceil(member / feet.spacing), math.isqrt(2 * MOST_PLACES_OF_GRID // count))
-    along = max(along, 6)
+    along = min(
+        FINEST_PLACES, math.ceil(float(members.mean()) / feet.spacing), math.isqrt(2 * MOST_PLACES_OF_GRID // len(near))
+    )
+    along = max(along, FEWEST_ON_SIDE)
     shares = np.array([[a, b, along - a - b] for a in range(along) for b in range(along - a)]) + 1.0 / 3.0
-    places = np.einsum("pc,tcx->tpx", shares / shares.sum(axis=1, keepdims=True), grid.nodes[grid.triangles])
+    places = np.einsum("pc,tcx->tpx", shares / shares.sum(axis=1, keepdims=True), grid.nodes[grid.triangles[near]])
     away = feet.away(places)
-    usual = np.quantile(away, SHARE_NEARER, axis=1)
-    beside = usual[_beside(grid)]  # (T, 4) of a triangle, and of those beside it
-    least = UNUSUAL * np.sort(beside, axis=1)[:, 1]
+    usual = np.full(len(grid.triangles), np.inf)
+    usual[near] = np.quantile(away, SHARE_NEARER, axis=1)
+    least = UNUSUAL * np.sort(usual[_beside(grid)[near]], axis=1)[:, 1]  # of a triangle and those beside it
     edges = np.linalg.norm(grid.nodes[grid.triangles] - grid.nodes[np.roll(grid.triangles, 1, axis=1)], axis=2)
     step = edges.mean(axis=1) / along
-    at, which = np.nonzero(away > np.maximum(least, LEAST_STEPS * step)[:, None])
+    least = np.maximum(least, LEAST_STEPS * step[near])
+    at, which = np.nonzero((away > least[:, None]) & (away <= WIDEST_HALF * members[:, None]))
     every = len(at) // MOST_FAR_PLACES + 1
     at, which = at[::every], which[::every]
-    return places[at, which], at, away[at, which], step * math.sqrt(every)
+    return places[at, which], near[at], away[at, which], step * math.sqrt(every)
 
 
 def _beside(grid: Grid) -> np.ndarray:
@@ -174,7 +184,7 @@ def _ways(grid: Grid, owner: np.ndarray) -> np.ndarray:
 
 
 def _moved_to_middle(
-    grid: Grid, feet: _Feet, places: np.ndarray, owner: np.ndarray, half: np.ndarray
+    grid: Grid, feet: FeetOnGrid, places: np.ndarray, owner: np.ndarray, half: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return places (P, 3) a step nearer to the middle of their gap, and how far each is from the nearest point (P,)."""
     tried = places[:, None] + (TO_MIDDLE * half)[:, None, None] * _ways(grid, owner)
@@ -185,7 +195,7 @@ def _moved_to_middle(
 
 
 def _has_points_on_both_sides(
-    grid: Grid, feet: _Feet, places: np.ndarray, owner: np.ndarray, half: np.ndarray
+    grid: Grid, feet: FeetOnGrid, places: np.ndarray, owner: np.ndarray, half: np.ndarray
 ) -> np.ndarray:
     """Return which places (P, 3) have points beyond half a width (P,) on opposite sides, as close together as a gap needs (P,) bool."""
     around = places[:, None, None] + (half[:, None] * BESIDE_GAP)[:, None, :, None] * _ways(grid, owner)[:, :, None]

@@ -9,6 +9,7 @@ import numpy as np
 from ..grid.certificate import Fault, place_of
 from .folds import fold_angles
 from .left_out import points_together
+from .limits import NOISES_OFF, PLACES_KEPT
 
 if TYPE_CHECKING:
     from ..grid.grid import Grid
@@ -26,6 +27,9 @@ WARN_SHARE = 0.01  # share of the points in such a part from which on it is said
 # share of the points that a grid is to follow above which it does not follow the scan, and how far off those are at least, beyond
 # the noise [member lengths]: as where one row of triangles runs along a bent strip; of two layers, followed by turns, it is half at most
 MOST_UNFOLLOWED, LEAST_OFF = 0.55, 0.05
+# distance from the grid, beyond the noise, from which on points are of a peak that it cuts off [member lengths], and how many these
+# are at least, in all and times as many as points of a line as long
+PEAK, FEWEST_OF_PEAK, WIDTH_OF_PEAK = 0.3, 12, 3.0
 
 
 def unfollowed_parts(
@@ -66,6 +70,30 @@ def mostly_unfollowed(
         f" {found.scan[worst]:.3g}{unit} off"
     )
     return [Fault("unfollowed", words, place_of(samples.scan[worst] + samples.origin))]
+
+
+def rounded_peaks(
+    grid: Grid, samples: SurfaceSamples, found: Distances, chosen: np.ndarray, members: np.ndarray
+) -> list[Fault]:
+    """Return a warning of peaks, tips and dips that a grid cuts off, however few of the points lie there.
+
+    Points far off that hang together are a surface, points that stand alone are none. Parameters as of `unfollowed_parts`.
+    """
+    noise = float(np.median(found.noise))
+    off = np.flatnonzero(chosen & (found.scan > PEAK * members + NOISES_OFF * noise) & (found.scan <= members))
+    if len(off) < FEWEST_OF_PEAK:
+        return []
+    part = points_together(samples.scan[off], np.full(len(off), SPACINGS_OF_CUBE * samples.spacing))
+    peaks = [off[part == number] for number in np.flatnonzero(np.bincount(part) >= FEWEST_OF_PEAK)]
+    peaks = [own for own in peaks if len(own) * samples.spacing >= WIDTH_OF_PEAK * _size(own, samples)]
+    if not peaks:
+        return []
+    peaks.sort(key=lambda own: -float(found.scan[own].max()))
+    worst = [int(own[found.scan[own].argmax()]) for own in peaks[:PLACES_KEPT]]
+    unit, more = f" {grid.unit}" if grid.unit else "", f" ({len(peaks)} such places)" if len(peaks) > 1 else ""
+    words = f"cuts off a peak, a tip or a dip by {found.scan[worst[0]]:.3g}{unit}{more}; shorter members follow it"
+    at, *others = (place_of(place) for place in samples.scan[worst] + samples.origin)
+    return [Fault("peak", words, at, tuple(others))]
 
 
 def _off(
