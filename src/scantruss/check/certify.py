@@ -29,6 +29,7 @@ from .left_out import closed_holes, first_and_more, parts_left_out
 from .limits import NOISES_OFF, ROUNDED_BY, limits_of, places_to_look_at, widened_limits
 from .sheets import cut_apart, faults_on_sheets, nodes_of_samples
 from .slits import narrow_gaps
+from .steps import unfollowed_steps
 from .unfollowed import mostly_unfollowed, rounded_peaks, unfollowed_parts
 
 if TYPE_CHECKING:
@@ -104,7 +105,7 @@ class Judged:
             lambda: [] if settings.boundary else doubtful_places(grid, samples, length),
             lambda: places_aside(grid, boundary, length),
             lambda: boundary_beyond(grid, samples, boundary, length),
-            lambda: [] if rough else unfollowed_parts(grid, samples, found, followed, members),
+            lambda: [] if rough else _beside(grid, samples, found, followed, members),
             lambda: cut_apart(grid, samples, found, length),
             lambda: nodes_off_sheets(grid, samples, length),
             lambda: mostly_bare(grid, samples, found, length),
@@ -296,6 +297,14 @@ def _mostly_unfollowed(grid: Grid, samples: SurfaceSamples, found: Distances, le
     if samples.moved:
         return []
     return mostly_unfollowed(grid, samples, found, _to_follow(samples), _desired_at_points(grid, found, length))
+
+
+def _beside(
+    grid: Grid, samples: SurfaceSamples, found: Distances, followed: np.ndarray, members: np.ndarray
+) -> list[Fault]:
+    """Return a warning of what a grid does not follow though it lies along it; parameters as of `unfollowed_parts`."""
+    parts = unfollowed_parts(grid, samples, found, followed, members)
+    return parts or unfollowed_steps(grid, samples, found, followed, members)
 
 
 def _missed(found: Distances, followed: np.ndarray, members: np.ndarray) -> int:
