@@ -29,7 +29,8 @@ MOST_PLACES_OF_GRID = 2_000_000  # places that are looked at in all
 MOST_FAR_PLACES = 10_000  # of those far from all points, how many are looked at closely
 # share of the places of a triangle that are nearer to a point than its usual distance, and least half width of a gap in those: at
 # random points one place in a million is as far, between lines of a scanner none
-SHARE_NEARER, UNUSUAL = 0.5, 4.5
+SHARE_NEARER, UNUSUAL = 0.5, 3.2
+SURELY, SLENDER = 4.5, 5.0  # ... where no place of a gap is farther than the first of these, it is as many widths long
 FEWEST_ON_SIDE = 6  # places along a side of a triangle at least
 # half width from which on a gap is a wide one, which is looked for elsewhere [member lengths]
 WIDEST_HALF = 0.4
@@ -42,6 +43,7 @@ LONG_GAP = 0.5  # length from which on a narrow gap is said [member lengths]
 LONG_MIDDLE = (
     0.25  # ... and of its middle, from half a width off its ends: a round one is looked for elsewhere [member lengths]
 )
+IN_A_ROW = 2.0  # gap between places of one narrow gap [steps between places]
 FEWEST_IN_GAP = 4  # in one gap
 
 
@@ -88,16 +90,16 @@ def narrow_gaps(
     near = np.flatnonzero(found.triangles <= WIDEST_HALF * members)  # others lie over closed holes and wide gaps
     if not len(near):
         return [], [], []
-    places, owner, half, step = _far_places(grid, near, members[near], feet)
+    places, owner, half, step, least = _far_places(grid, near, members[near], feet)
     if len(places) and samples.measured < len(samples.surface.mean):
         measured = ~is_over_holes(places, samples)
-        places, owner, half = places[measured], owner[measured], half[measured]
+        places, owner, half, least = places[measured], owner[measured], half[measured], least[measured]
     places, half = _moved_to_middle(grid, feet, places, owner, half)
     inside = _has_points_on_both_sides(grid, feet, places, owner, half)
-    places, owner, half = places[inside], owner[inside], half[inside]
+    places, owner, half, least = places[inside], owner[inside], half[inside], least[inside]
     if not len(places):
         return [], [], []
-    group = points_together(places, np.maximum(1.5 * step[owner], half))
+    group = points_together(places, IN_A_ROW * step[owner])
     gaps: list[tuple[LeftOut, float]] = []
     parts: list[LeftOut] = []
     for number in np.unique(group):
@@ -106,6 +108,8 @@ def narrow_gaps(
         along, member = _extent(places[own]), float(members[owner[own]].mean())
         gap = LeftOut("gap", 0, 0.0, place_of(middle + samples.origin), size := along + width)
         if len(own) < FEWEST_IN_GAP or size < LONG_GAP * member or along < LONG_MIDDLE * member:
+            continue
+        if along < SLENDER * width and not (half[own] * UNUSUAL > SURELY * least[own]).any():
             continue
         here = places[own] + samples.origin
         if not any(_holds(each, here) for each in known):
@@ -137,10 +141,12 @@ def normals_of(grid: Grid) -> np.ndarray:
 
 def _far_places(
     grid: Grid, near: np.ndarray, members: np.ndarray, feet: FeetOnGrid
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return places on some triangles (K,) that are unusually far from points (P, 3), a triangle and the distance of each (P,).
 
-    The last array is the distance between places of each of all triangles (T,); members : (K,) desired lengths [scan unit].
+    Then the distance between places of each of all triangles (T,), and the least unusual distance of each place (P,).
+
+    members : (K,) desired lengths [scan unit]
     """
     along = min(
         FINEST_PLACES, math.ceil(float(members.mean()) / feet.spacing), math.isqrt(2 * MOST_PLACES_OF_GRID // len(near))
@@ -154,11 +160,12 @@ def _far_places(
     least = UNUSUAL * np.sort(usual[_beside(grid)[near]], axis=1)[:, 1]  # of a triangle and those beside it
     edges = np.linalg.norm(grid.nodes[grid.triangles] - grid.nodes[np.roll(grid.triangles, 1, axis=1)], axis=2)
     step = edges.mean(axis=1) / along
-    least = np.maximum(least, LEAST_STEPS * step[near])
-    at, which = np.nonzero((away > least[:, None]) & (away <= WIDEST_HALF * members[:, None]))
+    at, which = np.nonzero(
+        (away > np.maximum(least, LEAST_STEPS * step[near])[:, None]) & (away <= WIDEST_HALF * members[:, None])
+    )
     every = len(at) // MOST_FAR_PLACES + 1
     at, which = at[::every], which[::every]
-    return places[at, which], near[at], away[at, which], step * math.sqrt(every)
+    return places[at, which], near[at], away[at, which], step * math.sqrt(every), least[at]
 
 
 def _beside(grid: Grid) -> np.ndarray:
