@@ -138,3 +138,14 @@ def test_beams_a_fifth_of_a_member_wide_are_named(length: float) -> None:
 def test_a_roof_that_bends_and_has_no_beams_has_no_such_warning(length: float) -> None:
     for bend in (14.0, 4.0):
         assert warning_of(ribbed(0.0, 0.0, bend), length) is None, bend
+
+
+@compiled_only
+@pytest.mark.parametrize("length", [2.9, 4.2])
+def test_waves_that_members_are_too_long_for_are_named_with_their_share(length: float) -> None:
+    rng = np.random.default_rng(11)
+    x, y = rng.uniform([0.0, 0.0], [20.0, 14.0], (60_000, 2)).T
+    points = np.column_stack([x, y, 0.5 * np.sin(2.0 * np.pi * x / 2.5) + 0.006 * y**2])
+    warning = known(warning_of(points + rng.normal(0.0, 0.005, points.shape), length))
+    share = float(warning.words.partition("scan: ")[2].partition("%")[0]) / 100.0
+    assert warning.words.startswith("smooths out waves") and 0.3 <= share <= 0.55
