@@ -11,11 +11,15 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from marks import compiled_only
 from scan_files import las, parquet_file, pcd, plate, text, written
+from typed import known
 
 from scantruss.cli.main import main
 from scantruss.cli.options import Parser, add_reading, selection_of
 from scantruss.errors import FormatError, InputError
+from scantruss.pipeline import grid_from_cloud
+from scantruss.report.figures import left_out_lines
 from scantruss.scan.formats.choose import in_polygon
 from scantruss.scan.formats.reading import read_points
 from scantruss.scan.stream import chunks
@@ -314,3 +318,18 @@ def test_what_is_held_is_told_without_points_that_are_none(tmp_path: Path, monke
             read("a.npy", Selection(classes=(9,), confidence=0.5))
         with pytest.raises(InputError, match=r"no point of b.npy is left: of 600 points 600 outside the box$"):
             read("b.npy", Selection(crop=("box:0,0,1,1",)))
+
+
+@compiled_only
+def test_a_grid_says_where_the_points_lie_that_a_crop_left_out(tmp_path: Path) -> None:
+    x, y = np.meshgrid(np.arange(0.0, 12.0, 0.2), np.arange(0.0, 8.0, 0.2))
+    np.save(tmp_path / "a.npy", np.column_stack([x.ravel(), y.ravel(), 0.05 * x.ravel()]) + [500.0, 100.0, 3.0])
+    cloud = read_points(tmp_path / "a.npy", selection=Selection(crop=("box:500,100,507,108",)))
+    grid = grid_from_cloud(cloud, Settings(length=1.0, effort="quick"))
+    (part,) = [part for part in known(grid.certificate).left_out if part.words == "outside the box"]
+    assert part.asked and part.points == 24 * 40
+    assert part.where == pytest.approx((509.5, 103.9, 3.475)) and part.size == pytest.approx(7.8)
+    assert any(
+        "outside the box, near (509.5, 103.9, 3.475), 7.8 across" in line
+        for line in left_out_lines(known(grid.certificate))
+    )

@@ -179,3 +179,16 @@ def test_the_command_says_what_it_left_out_and_how_to_keep_it(
     assert "taken for the floor and left out; --piece all keeps it" in said.err
     assert "too small for this length" not in said.err  # as the floor, which is told by itself
     assert "of the scan," in said.out.splitlines()[0] and "in a floor under the others" in said.out.splitlines()[0]
+
+
+@pytest.mark.parametrize(("cell", "is_floor"), [(1.4, True), (4.0, True), (6.5, False)])
+def test_a_floor_is_one_where_members_are_longer_than_the_room_is_high_at_its_sides(
+    cell: float, is_floor: bool
+) -> None:
+    """The roof stands 3 to 5 over the floor: half a member at least, and a member somewhere."""
+    rng = np.random.default_rng(5)
+    points = room(rng)
+    low = points[:, 2] < 1.0
+    points[~low, 2] += 3.0 - points[~low, 2].min()
+    points[~low, 2] = 3.0 + (points[~low, 2] - 3.0) * 2.0 / np.ptp(points[~low, 2])
+    assert (find_floor(points, low.astype(np.int64), (0, 1), cell) == 1) == is_floor

@@ -106,3 +106,46 @@ def test_a_row_of_triangles_under_a_bent_canopy_fails_and_names_its_share(length
 def test_a_canopy_of_shorter_members_passes_and_so_does_one_that_is_nearly_flat(rise: float, length: float) -> None:
     grid = grid_from_points(strip(rise), st.Settings(length=length, effort="quick"))
     assert known(grid.certificate).passed
+
+
+def ribbed(width: float, depth: float, bend: float = 14.0) -> np.ndarray:
+    """A shallow roof, 24 by 16, with three beams under it."""
+    rng = np.random.default_rng(11)
+
+    def roof(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        return np.asarray(3.0 * np.cos(x / bend) * np.cos(y / 12.0))
+
+    x, y = rng.uniform([-12.0, -8.0], [12.0, 8.0], (50_000, 2)).T
+    under = (abs(x[:, None] - [-6.0, 0.0, 6.0]) < width / 2.0).any(axis=1)
+    parts = [np.column_stack([x, y, roof(x, y) - depth * under])]
+    for side in (-width / 2.0, width / 2.0):
+        for middle in (-6.0, 0.0, 6.0) if width else ():
+            at, along = np.full(1500, middle + side), rng.uniform(-8.0, 8.0, 1500)
+            parts.append(np.column_stack([at, along, roof(at, along) - rng.uniform(0.0, depth, 1500)]))
+    points = np.concatenate(parts)
+    return points + rng.normal(0.0, 0.005, points.shape)
+
+
+@compiled_only
+@pytest.mark.parametrize("length", [2.7, 3.0, 3.3])
+def test_beams_a_fifth_of_a_member_wide_are_named(length: float) -> None:
+    words = known(warning_of(ribbed(0.6, 0.5), length)).words
+    assert "such as a beam" in words
+
+
+@compiled_only
+@pytest.mark.parametrize("length", [1.6, 3.0])
+def test_a_roof_that_bends_and_has_no_beams_has_no_such_warning(length: float) -> None:
+    for bend in (14.0, 4.0):
+        assert warning_of(ribbed(0.0, 0.0, bend), length) is None, bend
+
+
+@compiled_only
+@pytest.mark.parametrize("length", [2.9, 4.2])
+def test_waves_that_members_are_too_long_for_are_named_with_their_share(length: float) -> None:
+    rng = np.random.default_rng(11)
+    x, y = rng.uniform([0.0, 0.0], [20.0, 14.0], (60_000, 2)).T
+    points = np.column_stack([x, y, 0.5 * np.sin(2.0 * np.pi * x / 2.5) + 0.006 * y**2])
+    warning = known(warning_of(points + rng.normal(0.0, 0.005, points.shape), length))
+    share = float(warning.words.partition("scan: ")[2].partition("%")[0]) / 100.0
+    assert warning.words.startswith("smooths out waves") and 0.3 <= share <= 0.55

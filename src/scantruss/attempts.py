@@ -146,9 +146,14 @@ def only_leaves_out(fault: ScanTrussError) -> TypeGuard[CertificateError]:
 
 
 def joins_sheets(fault: ScanTrussError | None) -> bool:
-    """Whether a grid cuts itself everywhere since it joins sheets of the scan that lie too near each other: no other look parts them."""
+    """Whether a grid cuts itself everywhere since it joins sheets of the scan that lie too near each other: no other look parts them.
+
+    It has fewer pieces than the scan, or falls into more where the sheets are one piece of the scan, and is no manifold.
+    """
     found = fault.grid.certificate if isinstance(fault, CertificateError) else None
-    return found is not None and found.crossings >= MOST_CROSSINGS and found.pieces < found.scan_pieces
+    if found is None or found.crossings < MOST_CROSSINGS:
+        return False
+    return found.pieces < found.scan_pieces or (found.pieces > found.scan_pieces and not found.manifold)
 
 
 def _has_more_outliers(cloud: PointCloud, settings: Settings) -> bool:

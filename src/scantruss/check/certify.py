@@ -15,6 +15,7 @@ from ..errors import CertificateError
 from ..grid.certificate import Certificate, Fault, Spread, Worst, place_of
 from ..runtime.parallel import side_by_side
 from ..surface.chosen_samples import KEPT, LIMB, SLIT
+from .bare import mostly_bare
 from .boundaries import boundary_beyond, places_aside
 from .crossings import find_crossings
 from .defects import faults_in_space, faults_of_topology
@@ -27,7 +28,9 @@ from .irregular import count_irregular
 from .left_out import closed_holes, first_and_more, parts_left_out
 from .limits import NOISES_OFF, ROUNDED_BY, limits_of, places_to_look_at, widened_limits
 from .sheets import cut_apart, faults_on_sheets, nodes_of_samples
-from .unfollowed import mostly_unfollowed, unfollowed_parts
+from .slits import narrow_gaps
+from .steps import unfollowed_steps
+from .unfollowed import mostly_unfollowed, rounded_peaks, unfollowed_parts
 
 if TYPE_CHECKING:
     from ..boundary.find import Boundary
@@ -96,34 +99,41 @@ class Judged:
         followed = _to_follow(samples)
         missed_at = place_of(samples.scan[_missed(found, followed, members)] + samples.origin)
         rough = samples.moved  # then its roughness is the scatter
-        offsets, (gaps, bridged), doubtful, aside, beyond, beside, apart, off_sheets = side_by_side(
+        offsets, (gaps, bridged), doubtful, aside, beyond, beside, apart, off_sheets, bare, peaks = side_by_side(
             lambda: _offsets(grid, samples, length),
             lambda: bridged_gaps(grid, samples, boundary, length),
             lambda: [] if settings.boundary else doubtful_places(grid, samples, length),
             lambda: places_aside(grid, boundary, length),
             lambda: boundary_beyond(grid, samples, boundary, length),
-            lambda: [] if rough else unfollowed_parts(grid, samples, found, followed, members),
+            lambda: [] if rough else _beside(grid, samples, found, followed, members),
             lambda: cut_apart(grid, samples, found, length),
             lambda: nodes_off_sheets(grid, samples, length),
+            lambda: mostly_bare(grid, samples, found, length),
+            lambda: [] if rough else rounded_peaks(grid, samples, found, followed, members),
         )
         roughness = NOISES_OFF * offsets.get("node_scatter", 0.0) if rough else 0.0
         rounded = _rounded(found, followed, members, roughness)
         places = places_to_look_at(self.certificate, missed_at, rounded)
-        holes = [*closed_holes(samples, boundary), *first_and_more(gaps)]
-        lids = openings_closed(holes, bridged, length, grid.unit)
+        closed = closed_holes(samples, boundary)
+        slits, narrow, parts = narrow_gaps(grid, samples, found, [*closed, *gaps], length)
+        bridged = [each for each in bridged if each.kind == "bridged" or not each.is_said_by(parts)]
+        holes = [*closed, *first_and_more([*(gap for gap in gaps if gap not in parts), *slits])]
+        lids = openings_closed(holes, [*bridged, *narrow], length, grid.unit)
         return replace(
             self.certificate,
             left_out=(*self.certificate.left_out, *holes),
-            faults=(*self.certificate.faults, *beyond, *(each for each in bridged if each.kind == "bridged")),
+            faults=(*self.certificate.faults, *beyond, *bare, *(each for each in bridged if each.kind == "bridged")),
             warnings=(
                 *self.certificate.warnings,
                 *apart,
                 *off_sheets,
                 *(each for each in bridged if each.kind == "gap"),
+                *narrow,
                 *lids,
                 *doubtful,
                 *aside,
                 *beside,
+                *peaks,
                 *places,
             ),
             **offsets,
@@ -287,6 +297,14 @@ def _mostly_unfollowed(grid: Grid, samples: SurfaceSamples, found: Distances, le
     if samples.moved:
         return []
     return mostly_unfollowed(grid, samples, found, _to_follow(samples), _desired_at_points(grid, found, length))
+
+
+def _beside(
+    grid: Grid, samples: SurfaceSamples, found: Distances, followed: np.ndarray, members: np.ndarray
+) -> list[Fault]:
+    """Return a warning of what a grid does not follow though it lies along it; parameters as of `unfollowed_parts`."""
+    parts = unfollowed_parts(grid, samples, found, followed, members)
+    return parts or unfollowed_steps(grid, samples, found, followed, members)
 
 
 def _missed(found: Distances, followed: np.ndarray, members: np.ndarray) -> int:

@@ -87,8 +87,8 @@ def distances_to_points(
         boxes = boxes_of(samples.surface.points, POINT_BOX * length)
     to_nodes, noise = distances_to_planes(grid.nodes, samples, boxes)
     if samples.measured < len(samples.surface.mean):
-        to_middles[_over_holes(middles, samples)] = np.nan
-        over = _over_holes(grid.nodes, samples)
+        to_middles[is_over_holes(middles, samples)] = np.nan
+        over = is_over_holes(grid.nodes, samples)
         to_nodes[over] = to_corners[over] = np.nan
     if grid.deviation is not None:
         to_nodes[np.isnan(grid.deviation)] = np.nan
@@ -145,7 +145,7 @@ def boxes_of(points: np.ndarray, box: float) -> SearchBoxes:
     return boxes
 
 
-def _over_holes(places: np.ndarray, samples: SurfaceSamples) -> np.ndarray:
+def is_over_holes(places: np.ndarray, samples: SurfaceSamples) -> np.ndarray:
     """Return which places (Q, 3) lie over closed holes: a sample of made-up points is nearer than any other."""
     mean, away = samples.surface.mean, []
     for part in (mean[: samples.measured], mean[samples.measured :]):

@@ -36,8 +36,16 @@ def parts_left_out(
     total = len(samples.scan) + sum(number for _, number in samples.unread)
     return (
         *(part for part, _ in points_left_out(samples, found.scan, members, reach)),
-        *(LeftOut(words, number, number / total, asked=True) for words, number in samples.unread),
+        *(_unread(words, number, number / total, samples) for words, number in samples.unread),
     )
+
+
+def _unread(words: str, number: int, share: float, samples: SurfaceSamples) -> LeftOut:
+    """Return points that were not read, with the middle and the size of the box around them where a crop left them out."""
+    box = next((box for crop, box in samples.cropped if crop == words), None)
+    if box is None:
+        return LeftOut(words, number, share, asked=True)
+    return LeftOut(words, number, share, place_of(box.mean(axis=0)), float(np.ptp(box, axis=0).max()), asked=True)
 
 
 def points_left_out(

@@ -9,6 +9,7 @@ import numpy as np
 from ..grid.certificate import Fault, place_of
 from .folds import fold_angles
 from .left_out import points_together
+from .limits import NOISES_OFF, PLACES_KEPT
 
 if TYPE_CHECKING:
     from ..grid.grid import Grid
@@ -26,6 +27,10 @@ WARN_SHARE = 0.01  # share of the points in such a part from which on it is said
 # share of the points that a grid is to follow above which it does not follow the scan, and how far off those are at least, beyond
 # the noise [member lengths]: as where one row of triangles runs along a bent strip; of two layers, followed by turns, it is half at most
 MOST_UNFOLLOWED, LEAST_OFF = 0.55, 0.05
+WARN_UNFOLLOWED = 0.3  # ... above which that is said: 0.30 to 0.48 on corrugated roofs, at most 0.26 on 200 grids that keep to their scans
+# distance from the grid, beyond the noise, from which on points are of a peak that it cuts off [member lengths], and how many these
+# are at least, in all and times as many as points of a line as long
+PEAK, FEWEST_OF_PEAK, WIDTH_OF_PEAK = 0.3, 12, 3.0
 
 
 def unfollowed_parts(
@@ -49,6 +54,13 @@ def unfollowed_parts(
     large = np.flatnonzero(points >= WARN_SHARE * len(samples.scan))
     parts = [which[part == number] for number in large[np.argsort(-points[large], kind="stable")].tolist()]
     long = [own for own in parts if _size(own, samples) >= LONG * members[own].mean()]
+    if not long and len(which) > WARN_UNFOLLOWED * chosen.sum():
+        unit, worst = f" {grid.unit}" if grid.unit else "", int(which[found.scan[which].argmax()])
+        words = (
+            f"smooths out waves or folds of the scan: {len(which) / chosen.sum():.0%} of its points lie up to"
+            f" {found.scan[worst]:.3g}{unit} off; shorter members follow them"
+        )
+        return [Fault("unfollowed", words, place_of(samples.scan[worst] + samples.origin))]
     return [_warning(grid, samples, found, long)] if long else []
 
 
@@ -66,6 +78,30 @@ def mostly_unfollowed(
         f" {found.scan[worst]:.3g}{unit} off"
     )
     return [Fault("unfollowed", words, place_of(samples.scan[worst] + samples.origin))]
+
+
+def rounded_peaks(
+    grid: Grid, samples: SurfaceSamples, found: Distances, chosen: np.ndarray, members: np.ndarray
+) -> list[Fault]:
+    """Return a warning of peaks, tips and dips that a grid cuts off, however few of the points lie there.
+
+    Points far off that hang together are a surface, points that stand alone are none. Parameters as of `unfollowed_parts`.
+    """
+    noise = float(np.median(found.noise))
+    off = np.flatnonzero(chosen & (found.scan > PEAK * members + NOISES_OFF * noise) & (found.scan <= members))
+    if len(off) < FEWEST_OF_PEAK:
+        return []
+    part = points_together(samples.scan[off], np.full(len(off), SPACINGS_OF_CUBE * samples.spacing))
+    peaks = [off[part == number] for number in np.flatnonzero(np.bincount(part) >= FEWEST_OF_PEAK)]
+    peaks = [own for own in peaks if len(own) * samples.spacing >= WIDTH_OF_PEAK * _size(own, samples)]
+    if not peaks:
+        return []
+    peaks.sort(key=lambda own: -float(found.scan[own].max()))
+    worst = [int(own[found.scan[own].argmax()]) for own in peaks[:PLACES_KEPT]]
+    unit, more = f" {grid.unit}" if grid.unit else "", f" ({len(peaks)} such places)" if len(peaks) > 1 else ""
+    words = f"cuts off a peak, a tip or a dip by {found.scan[worst[0]]:.3g}{unit}{more}; shorter members follow it"
+    at, *others = (place_of(place) for place in samples.scan[worst] + samples.origin)
+    return [Fault("peak", words, at, tuple(others))]
 
 
 def _off(

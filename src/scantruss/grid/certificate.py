@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, fields
 from typing import TYPE_CHECKING, Any
 
@@ -25,11 +26,15 @@ class Fault:
 
     #: empty manifold orientable pieces loops crossing folded uneven cover torn astray fixed beyond bridged; angle
     #: short long offset unfollowed as fault or warning; of a warning aside, far, left out, gap, closed, hole, zigzag, cut,
-    #: missed, rounded, apart, ridge
+    #: missed, rounded, peak, apart, ridge
     kind: str
     words: str
     where: Place | None = None  #: a place in the scan's own frame [scan unit], the worst
     also: tuple[Place, ...] = ()  #: more such places
+
+    def is_said_by(self, parts: Sequence[LeftOut]) -> bool:
+        """Whether each of its places is one of those of some parts."""
+        return {self.where, *self.also} <= {part.where for part in parts}
 
 
 @dataclass(frozen=True)

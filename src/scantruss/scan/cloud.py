@@ -56,6 +56,7 @@ class PointCloud:
     notes: tuple[str, ...] = ()  #: what a user should know about how it was read
     normals: np.ndarray | None = None  #: (N, 3) that came with the points
     system: str = ""  #: reference system of the coordinates, such as EPSG:25833; "" where it is not known
+    cropped: tuple[tuple[str, np.ndarray], ...] = ()  #: (2, 3) the box around what is left out by a crop, by its words
 
     def __repr__(self) -> str:
         """Give the number of points and the extent."""

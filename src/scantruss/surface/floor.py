@@ -6,6 +6,7 @@ import numpy as np
 
 LEVEL_COSINE = 0.996  # least cosine between the normal of a floor and the vertical: 5 degrees
 FLOOR_RMS = 0.004  # largest rms distance of a floor from its plane [its longest side]
+LEAST_HEIGHT = 0.5  # least height of the others over a floor, of which some stand higher than one [cells]
 SHARE_OVER_FLOOR = 0.7  # least share of the other pieces that lies over the floor in plan
 SHARE_OF_FLOOR = 0.25  # least share of the floor that lies under the other pieces in plan
 
@@ -27,11 +28,9 @@ def find_floor(mean: np.ndarray, piece: np.ndarray, pieces: tuple[int, ...], cel
     middle = floor.mean(axis=0)
     _, spread, axes = np.linalg.svd(floor - middle, full_matrices=False)
     flat = spread[2] / np.sqrt(len(floor)) <= FLOOR_RMS * float(np.ptp(floor, axis=0).max())
-    if (
-        not flat
-        or abs(axes[2, 2]) < LEVEL_COSINE
-        or float(((others - middle) @ (axes[2] * np.sign(axes[2, 2]))).min()) <= cell
-    ):
+    height = (others - middle) @ (axes[2] * np.sign(axes[2, 2]))
+    is_over = float(height.min()) > LEAST_HEIGHT * cell and float(height.max()) > cell
+    if not flat or abs(axes[2, 2]) < LEVEL_COSINE or not is_over:
         return None
     below, above = _cells(floor, cell), _cells(others, cell)
     both = len(below & above)

@@ -81,6 +81,8 @@ class SurfaceSamples:
     system: str = ""  #: reference system of the scan
     given: GivenNormals | None = None  #: normals that came with the scan
     rings: tuple[LimbRing, ...] = ()  #: where limbs too thin for a grid were cut off
+    #: (2, 3) the box around the points that were not read since a crop left them out, by its words, in the scan's own frame
+    cropped: tuple[tuple[str, np.ndarray], ...] = ()
 
     @property
     def outliers(self) -> int:
@@ -159,7 +161,9 @@ def sample_surface(cloud: PointCloud, settings: Settings) -> SurfaceSamples:
         made = _prepare(cloud.points, cloud.bounds, cloud.spacing, asked, given_normals(cloud))
         check_is_surface(made)
         unread = (*cloud.left_out, *((WITHOUT_COORDINATES, cloud.dropped) for _ in range(cloud.dropped > 0)))
-        kept[asked] = replace(made, origin=cloud.origin, unit=cloud.unit, system=cloud.system, unread=unread)
+        kept[asked] = replace(
+            made, origin=cloud.origin, unit=cloud.unit, system=cloud.system, unread=unread, cropped=cloud.cropped
+        )
     return kept[asked]
 
 
@@ -201,6 +205,7 @@ def samples_with(
         scan=samples.scan,
         judged=samples.judged,
         unread=samples.unread,
+        cropped=samples.cropped,
         whole=samples.whole,
         sample_spacing=samples.sample_spacing,
         rough=samples.rough,

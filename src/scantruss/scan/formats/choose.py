@@ -65,6 +65,31 @@ def choose(
     return kept, left_out
 
 
+def cropped_boxes(points: np.ndarray, kept: np.ndarray, selection: Selection) -> dict[str, np.ndarray]:
+    """Return the lower and the upper corner (2, 3) of the box around the points that the crop leaves out, by its words.
+
+    Parameters
+    ----------
+    points : (N, 3) array
+        In the scan's own frame.
+    kept : (N,) bool, which of them are taken
+    selection : what to take
+    """
+    left, boxes = np.flatnonzero(~kept), dict[str, np.ndarray]()
+    left = left[np.isfinite(points[left]).all(axis=1)]
+    for crop in selection.crop:
+        out = points[left[~_crop_test(points, crop)(left)]]
+        if len(out):
+            words, box = _outside(crop.partition(":")[0]), np.stack([out.min(axis=0), out.max(axis=0)])
+            boxes[words] = box_around([box, boxes[words]] if words in boxes else [box])
+    return boxes
+
+
+def box_around(boxes: Sequence[np.ndarray]) -> np.ndarray:
+    """Return the box (2, 3) around some boxes."""
+    return np.stack([np.min([box[0] for box in boxes], axis=0), np.max([box[1] for box in boxes], axis=0)])
+
+
 def places_in(crops: Sequence[str], scale: np.ndarray) -> list[WantedBox]:
     """Return the boxes around parts of space in the unit of a file, whose axes are `scale` (3,) units of the scan long."""
     places = []

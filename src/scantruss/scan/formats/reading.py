@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +15,7 @@ from ...selection import Selection
 from ..checks import degrees_note, extent_note, extent_of, single_precision_note
 from ..cloud import PointCloud
 from ..units import check_unit, name_of
-from .choose import check_attributes, choose, describe_points, places_in
+from .choose import box_around, check_attributes, choose, cropped_boxes, describe_points, places_in
 from .columns import NORMAL_COLUMNS
 from .common_unit import to_common_unit
 from .content import Content
@@ -41,6 +41,7 @@ class Part:
     held: str  #: what could have been selected, if nothing was
     notes: tuple[str, ...]
     normals: np.ndarray | None = None  #: (N, 3)
+    cropped: dict[str, np.ndarray] = field(default_factory=dict)  #: (2, 3) the box around what each crop left out
     in_system: bool = True  #: whether the points are still in the units of that system
 
 
@@ -86,7 +87,13 @@ def read_points(path: FileNames, unit: str = "", selection: Selection | None = N
     left_out = add_counts([*(part.left_out for part in parts), dict(cloud.left_out)])
     common_system = system_of_all([(part.system, part.in_system) for part in parts])
     notes = (*notes, *cloud.notes, *degrees_note(cloud), *single_precision_note(cloud))
-    return replace(cloud, notes=notes, left_out=tuple(left_out.items()), system=common_system)
+    every = [part.cropped for part in parts]
+    cropped = {
+        words: box_around([boxes[words] for boxes in every if words in boxes]) for boxes in every for words in boxes
+    }
+    return replace(
+        cloud, notes=notes, left_out=tuple(left_out.items()), cropped=tuple(cropped.items()), system=common_system
+    )
 
 
 def read_part(path: Path, unit: str, selection: Selection, common: str = "") -> Part:
@@ -116,13 +123,15 @@ def select(
     points, unit, notes = to_common_unit(path, content, unit, selection.z_unit, common)
     kept, chosen = choose(points, content.attributes, selection)
     held = "" if kept.any() else _describe(points, content, described)
-    normals = content.normals
+    normals, cropped = content.normals, dict[str, np.ndarray]()
     if not kept.all():
+        cropped = cropped_boxes(points, kept, selection) if selection.crop else cropped
         points = points[kept]
         normals = normals if normals is None else normals[kept]
     left_out = add_counts([content.left_out, chosen, content.unread])
     count = len(points) + sum(left_out.values())
-    return Part(points, unit, content.system, count, left_out, held, notes, normals, stays_in_system(content, unit))
+    in_system = stays_in_system(content, unit)
+    return Part(points, unit, content.system, count, left_out, held, notes, normals, cropped, in_system)
 
 
 def _describe(points: np.ndarray, content: Content, most: int | None) -> str:
