@@ -49,9 +49,9 @@ def test_a_sphere_has_its_own_radius_and_a_plate_none() -> None:
     rng = np.random.default_rng(0)
     ball = rng.normal(size=(20_000, 3))
     ball *= 7.0 / np.linalg.norm(ball, axis=1, keepdims=True)
-    assert Advice(st.PointCloud.from_array(ball), st.Settings(length=1.0)).radius() == pytest.approx(7.0, rel=0.1)
+    assert Advice(st.PointCloud.from_array(ball), st.Settings(length=1.0)).radius == pytest.approx(7.0, rel=0.1)
     flat = np.column_stack([rng.uniform(0, 20, (8000, 2)), np.zeros(8000)])
-    assert Advice(st.PointCloud.from_array(flat), st.Settings(length=1.0)).radius() > 200.0
+    assert Advice(st.PointCloud.from_array(flat), st.Settings(length=1.0)).radius > 200.0
 
 
 def test_members_are_estimated_from_the_area() -> None:
@@ -171,7 +171,7 @@ def points_of_run(cloud: st.PointCloud, length: float) -> float:
 def test_no_sag_is_given_of_a_member_longer_than_the_bend_is_wide(monkeypatch: pytest.MonkeyPatch) -> None:
     cloud = cloud_of("limpet")
     monkeypatch.setattr(Advice, "try_length", lambda *_, **__: None)
-    monkeypatch.setattr(Advice, "radius", lambda _: 0.5 * suggest_length(cloud))
+    monkeypatch.setattr(Advice, "radius", property(lambda _: 0.5 * suggest_length(cloud)))
     head, rows = advice_rows(Advice(cloud, st.Settings(length=1.0)), suggest_length(cloud), cloud)
     sags = {float(row[0]): row[head.index("sag L^2/8R [mm]" if cloud.unit else "sag L^2/8R")] for row in rows}
     assert len(sags) > 2 and all((sag == "-") == (length > suggest_length(cloud)) for length, sag in sags.items())

@@ -373,7 +373,8 @@ def test_help_and_version_import_nothing_heavy() -> None:
 
 
 def test_a_grid_is_made_without_what_other_commands_and_formats_load(ready: Path) -> None:
-    others = "scipy.sparse scipy.spatial matplotlib openpyxl ezdxf rhino3dm viser dask"
+    others = "scipy matplotlib openpyxl ezdxf rhino3dm viser dask threadpoolctl scantruss.cli.sweep"
+    others += " scantruss.structure.truss scantruss.layouts.double_layer scantruss.cells.hexagons"
     code = (
         "import sys, scantruss.cli.main as cli\n"
         f"assert cli.main('grid scan.xyz light.json --length {LENGTH} --effort quick -q'.split()) == 0\n"

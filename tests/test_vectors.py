@@ -17,6 +17,7 @@ from scantruss.kernels.geometry.vectors import (
     subtract,
     unit,
 )
+from scantruss.scan.vectors import pairs_within
 
 pytestmark = pytest.mark.kernels
 
@@ -110,3 +111,15 @@ def test_smallest_eigenvector_does_not_depend_on_the_scale(scale: float) -> None
     m = matrix * scale
     found = np.array(smallest_eigenvector(m[0, 0], m[0, 1], m[0, 2], m[1, 1], m[1, 2], m[2, 2]))
     assert abs(found @ expected) > 1 - 1e-12
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 60])
+@pytest.mark.parametrize("reach", [0.0, 0.2, 3.0])
+def test_pairs_within_a_distance_are_those_of_all_pairs(count: int, reach: float) -> None:
+    places = np.random.default_rng(count).random((count, 3))
+    places[: count // 3, 0] = 0.5  # many with one coordinate
+    places[count // 2 :] = places[: count - count // 2]  # and some that coincide
+    near = [
+        (i, j) for i in range(count) for j in range(i + 1, count) if ((places[j] - places[i]) ** 2).sum() <= reach**2
+    ]
+    assert list(zip(*(found.tolist() for found in pairs_within(places, reach)), strict=True)) == near

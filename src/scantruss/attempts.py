@@ -52,6 +52,7 @@ class Attempt:
         None  #: how its fronts are laid out; None: as the effort of the settings allows
     )
     faults: tuple[tuple[float, float, float], ...] = ()  #: places at which ridges are given up [scan unit]
+    is_trial: bool = False  #: whether all that counts is that a grid passes
 
     def after(self, fault: FrontError, cloud: PointCloud) -> Attempt | None:
         """The same attempt with the ridges given up where it failed; None where that is not known or no ridge is near."""

@@ -111,9 +111,12 @@ def best_that_passes(
     constraints: Constraints,
     settings: Settings,
     *,
+    is_trial: bool = False,
     progress: Progress | None = None,
 ) -> Grid:
     """Improve the first candidates to the end, check them, and return the best that passes, with its certificate.
+
+    is_trial : a grid that passes is left as it is, without nodes on the tips of the scan
 
     Raises
     ------
@@ -122,7 +125,8 @@ def best_that_passes(
     """
     if settings.effort == "best" and settings.method == "default":
         return no_worse(candidates, samples, boundary, constraints, settings, progress=progress)
-    return grid_of(chosen(those_that_pass(candidates, samples, boundary, constraints, settings, progress=progress)))
+    passed = those_that_pass(candidates, samples, boundary, constraints, settings, is_trial=is_trial, progress=progress)
+    return grid_of(chosen(passed))
 
 
 def those_that_pass(
@@ -132,6 +136,7 @@ def those_that_pass(
     constraints: Constraints,
     settings: Settings,
     *,
+    is_trial: bool = False,
     progress: Progress | None = None,
 ) -> list[Candidate]:
     """Improve the first candidates to the end, check them, and return those that pass, with their certificates.
@@ -146,7 +151,8 @@ def those_that_pass(
         try:
             grid = improve_last(candidate.mesh, candidate.front, samples, constraints, candidate.settings)
             candidate.take(judged(grid, samples, boundary, settings))
-            if samples.rough <= VERY_ROUGH_SCAN and misses_at_most(grid_of(candidate), MOST_MISSED):
+            done = is_trial and candidate.passes  # nodes on tips would only make it better
+            if not done and samples.rough <= VERY_ROUGH_SCAN and misses_at_most(grid_of(candidate), MOST_MISSED):
                 reach_tips_of(candidate, samples, boundary, constraints, settings)
             candidate.end()
         except FrontError as error:

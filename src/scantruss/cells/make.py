@@ -13,11 +13,8 @@ from ..errors import CertificateError
 from ..grid.certificate import Fault, place_of
 from ..grid.grid import Grid
 from ..grid.panels import PLANAR_ENOUGH, planarity_of
-from ..improve.images import Images
-from ..improve.working_mesh import WorkingMesh
 from ..runtime.progress import Progress
 from ..surface.scratch import with_own_scratch
-from .hexagons import TRIANGLE_MEMBER, hexagons_of, made_alike
 
 #: shares of how far nodes may be off the scan with which panels are made planar, until a grid passes; with none it stays as it is
 SHARES_OFF_SCAN = (1.0, 0.5, 0.0)
@@ -26,6 +23,7 @@ TIMES_ROWS_TRIED = 5  # times that other starts of rows are tried where quads fa
 if TYPE_CHECKING:
     from ..boundary.find import Boundary
     from ..constraints.find import Constraints
+    from ..improve.working_mesh import WorkingMesh
     from ..settings import Settings
     from ..surface.samples import SurfaceSamples
 
@@ -35,6 +33,8 @@ def settings_of_triangles(settings: Settings) -> Settings:
     if settings.cells == "quad":
         return settings.replace(effort="quick")
     if settings.cells == "hexagon":
+        from .hexagons import TRIANGLE_MEMBER  # which other grids do not load
+
         closed = settings.closed_boundary_length
         return settings.replace(length=TRIANGLE_MEMBER * settings.length, fill_holes=closed, fixed=[])
     return settings
@@ -43,6 +43,8 @@ def settings_of_triangles(settings: Settings) -> Settings:
 def judging_settings(settings: Settings) -> Settings:
     """Return the settings by which a certificate judges: members of the boundary of hexagons are as long as those of the triangles."""
     if settings.cells == "hexagon":
+        from .hexagons import TRIANGLE_MEMBER
+
         return settings.replace(max_length=TRIANGLE_MEMBER * settings.max_length)
     return settings
 
@@ -77,6 +79,8 @@ def with_cells(
     if settings.cells == "triangle":
         return grid
     if settings.cells == "hexagon":
+        from .hexagons import hexagons_of
+
         made = hexagons_of(grid, samples, boundary, constraints, settings, progress=progress)
         return _judged(made, samples, boundary, constraints, settings)
     from .quads import ROW_STARTS, STARTS_TRIED, quads_of  # needs scipy, which other grids do not load
@@ -100,6 +104,9 @@ def _judged(
     """Return a grid of cells, made planar if that is wanted, with its certificate."""
     if not settings.planar:
         return certified_cells(made.replace(settings=settings), samples, boundary, settings)
+    from ..improve.images import Images
+    from ..improve.working_mesh import WorkingMesh
+    from .hexagons import made_alike
     from .planar import make_planar  # needs scipy, which other grids do not load
     from .stops import at_stops
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
@@ -27,6 +28,10 @@ AROUND_NODE = 1.0  # radius within which points are compared with a node [member
 COMPARED_WITH_NODE = 30  # points a node that are compared with it
 POINTS_OF_PLANE = 12  # points through which the plane at a node goes
 PLACES_MEASURED_PER_THREAD = 20_000  # fewest points for a thread of their own
+
+_KEPT_BOXES: weakref.WeakKeyDictionary[SurfaceSamples, dict[tuple[bool, float], SearchBoxes]] = (
+    weakref.WeakKeyDictionary()
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,13 +83,14 @@ def distances_to_points(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the distances of the triangles and of the nodes from the scan, and its noise there; see `Distances`."""
     points = samples.measured_points
-    boxes = boxes_of(points, max(POINT_BOX * length, 2.0 * samples.spacing))
-    middles = grid.nodes[grid.triangles].mean(axis=1)
+    boxes = kept_boxes_of(points, max(POINT_BOX * length, 2.0 * samples.spacing), samples)
+    a, b, c = (grid.nodes[grid.triangles[:, k]] for k in range(3))
+    middles = (a + b + c) / 3.0
     to_middles, to_corners = np.empty(len(middles)), np.empty(len(grid.nodes))
     nearest_distances(middles, points, boxes, 2.0 * samples.spacing, to_middles)
     nearest_distances(grid.nodes, points, boxes, 2.0 * samples.spacing, to_corners)
     if samples.moved:  # nodes lie on the mean surface
-        boxes = boxes_of(samples.surface.points, POINT_BOX * length)
+        boxes = kept_boxes_of(samples.surface.points, POINT_BOX * length, samples)
     to_nodes, noise = distances_to_planes(grid.nodes, samples, boxes)
     if samples.measured < len(samples.surface.mean):
         to_middles[is_over_holes(middles, samples)] = np.nan
@@ -136,6 +142,14 @@ def _node_normals(grid: Grid) -> np.ndarray:
     sums = np.stack([np.bincount(corners, own[:, k], len(grid.nodes)) for k in range(3)], axis=1)
     normals: np.ndarray = sums / np.maximum(np.linalg.norm(sums, axis=1), 1e-300)[:, None]
     return normals
+
+
+def kept_boxes_of(points: np.ndarray, box: float, samples: SurfaceSamples) -> SearchBoxes:
+    """Return the measured points of a scan, or those of its mean surface, by box; they are kept for as long as its samples exist."""
+    kept, asked = _KEPT_BOXES.setdefault(samples, {}), (points is samples.surface.points, box)
+    if asked not in kept:
+        kept[asked] = boxes_of(points, box)
+    return kept[asked]
 
 
 def boxes_of(points: np.ndarray, box: float) -> SearchBoxes:

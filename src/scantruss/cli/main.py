@@ -8,9 +8,8 @@ from __future__ import annotations
 import os
 import signal
 import sys
-from collections.abc import Sequence
-from types import ModuleType
-from typing import cast
+from collections.abc import Callable, Sequence
+from functools import partial
 
 from .. import __version__
 from ..errors import CertificateError, InputError, ScanTrussError, did_you_mean, words_of_error
@@ -66,6 +65,17 @@ def run(words: Sequence[str]) -> None:
     if words[0] in ("--version", "-V"):
         print(f"scantruss {__version__}")
         return
+    from ..runtime.memory import made_before_set_aside, nothing_collected
+
+    with nothing_collected():
+        command = command_of(words)
+    if command is not None:
+        with made_before_set_aside():
+            command()
+
+
+def command_of(words: Sequence[str]) -> Callable[[], None] | None:
+    """Return a command with all that it needs imported; None where only its help was asked for, and is printed."""
     from .commands import COMMANDS
 
     if words[0] not in COMMANDS:
@@ -76,26 +86,28 @@ def run(words: Sequence[str]) -> None:
     parser = make_parser()
     if "-h" in words or "--help" in words:
         print(parser.format_help(), end="")
-        return
+        return None
     values = parser.read(words[1:])
     from ..report import terminal
 
     terminal.quiet = values.quiet
     import_numba_without_blas()
-    command(values)
+    return partial(command, values)
 
 
 def import_numba_without_blas() -> None:
-    """Import numba without scipy.linalg, which numba imports if scipy is installed: that takes a seventh of a short command.
+    """Import numba without scipy, of which it imports a part if that is installed: that takes a seventh of a short command.
 
     Only matrix products in kernels need it, and there are none.
     """
-    if (name := "scipy.linalg.cython_blas") not in sys.modules:
-        sys.modules[name] = cast(ModuleType, None)  # as if it could not be imported
+    absent = {name for name in ("scipy", "scipy.linalg.cython_blas") if name not in sys.modules}
+    if absent:
+        sys.modules.update(dict.fromkeys(absent))  # type: ignore[arg-type]  # as if they could not be imported
         try:
             import numba.np.arraymath  # noqa: F401
         finally:
-            del sys.modules[name]
+            for name in absent:
+                del sys.modules[name]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

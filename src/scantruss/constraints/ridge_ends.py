@@ -6,6 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..scan.vectors import pairs_within
+
 LONGEST_BRIDGE = 4.0  # longest gap over which the ends of two ridges are joined [member lengths]
 COSINE_TO_OTHER_END = 0.94  # least cosine of the angle between such an end and the way to the other
 # least cosine of the angle between the ends of one ridge and the way between them that makes it a ring
@@ -159,12 +161,10 @@ def _ends_of(ridge: Ridge) -> tuple[End, End]:
 
 def _facing(ends: list[End], length: float) -> tuple[int, int] | None:
     """Return the numbers of two ends of two ridges that face each other over the smallest gap, of the two ends of each in turn."""
-    from scipy.spatial import cKDTree  # which grids without ridges do not load
-
     places, ahead = (np.array([getattr(end, name) for end in ends]).reshape(-1, 3) for name in ("place", "ahead"))
-    near = cKDTree(places).query_pairs(LONGEST_BRIDGE * length, output_type="ndarray")
-    near = near[near[:, 0] // 2 != near[:, 1] // 2]
-    one, two = near[np.lexsort(near.T[::-1])].T
+    one, two = pairs_within(places, LONGEST_BRIDGE * length)
+    of_two = one // 2 != two // 2
+    one, two = one[of_two], two[of_two]
     gap = places[two] - places[one]
     size = np.linalg.norm(gap, axis=1)
     least = np.minimum((gap * ahead[one]).sum(axis=1), -(gap * ahead[two]).sum(axis=1))

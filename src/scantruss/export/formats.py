@@ -20,7 +20,6 @@ from ..runtime.places import check_place, nearest_suffix, suffix_of
 from ..scan.cloud import PointCloud
 from ..scan.formats.extras import need_library
 from ..settings import UNITS
-from ..structure.truss import Truss
 from .csv import encode_csv, nodes_path
 from .model import Model, members_of, model_of_grid, model_of_truss
 from .style import PAGE_POINTS, FileStyle
@@ -28,6 +27,7 @@ from .style import PAGE_POINTS, FileStyle
 if TYPE_CHECKING:
     from ..structure.report import StructureReport
     from ..structure.results import Solution
+    from ..structure.truss import Truss
     from .drawing_in import Drawing
 
 Encoder = Callable[[Model, Path, FileStyle], dict[Path, bytes]]
@@ -211,6 +211,8 @@ def model_of(
         return what
     if isinstance(what, Grid):
         return model_of_grid(what, cloud)
+    from ..structure.truss import Truss  # which grids do not load
+
     if isinstance(what, Truss):
         return model_of_truss(what)
     if not hasattr(what, "truss"):

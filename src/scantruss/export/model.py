@@ -16,10 +16,7 @@ from ..grid.groups import member_groups
 from ..grid.line_sets import FIXED_LINE, LineSet
 from ..grid.marks import member_marks, node_marks, numbered, panel_marks
 from ..grid.panels import loops_of
-from ..layouts.framework import Framework
 from ..settings import UNITS
-from ..structure.groups import member_groups_of
-from ..structure.layered import framework_of
 
 if TYPE_CHECKING:
     from ..scan.cloud import PointCloud
@@ -101,7 +98,7 @@ class Model:
         FormatError
             Some members are sides of no panel, which the format `what` cannot hold.
         """
-        if self.grid is None or isinstance(self.grid, Framework):
+        if self.grid is None or type(self.grid) is not Grid:  # else it is a `Framework`, which usual grids do not load
             way = (
                 "use another format"
                 if self.truss
@@ -117,6 +114,8 @@ def members_of(model: Model) -> Grid:
         return model.grid
     if model.truss is None:
         raise TypeError("a model is of a grid or of a structure")
+    from ..structure.layered import framework_of
+
     return framework_of(model.truss)
 
 
@@ -150,6 +149,8 @@ def model_of_truss(
     utilization: np.ndarray | None = None,
 ) -> Model:
     """Return the model of a structure, in metres."""
+    from ..structure.groups import member_groups_of
+
     grid = _grid_of(truss)
     model = model_of_grid(grid) if np.array_equal(grid.edges, np.sort(truss.members, axis=1)) else None
     groups, group_of = (model.groups, model.group_of) if model else member_groups_of(truss)

@@ -65,6 +65,12 @@ class Candidate:
         self.grid = passed_grid(self.judged.certified_grid())
 
     @property
+    def passes(self) -> bool:
+        """Whether nothing is found to be wrong with its grid."""
+        found = self.grid.certificate if self.grid is not None else None
+        return found is not None and found.passed
+
+    @property
     def is_poor(self) -> bool:
         """Whether its worst triangle is a poor one."""
         return self.grid is not None and self.grid.quality.shape_min < POOR_SHAPE

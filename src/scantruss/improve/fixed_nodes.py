@@ -153,9 +153,10 @@ def take_place(
 
 def nodes_around(net: Net, v: int, rings: int) -> np.ndarray:
     """Return the nodes within some members of a node, (K,) int64."""
-    near = np.array([v])
+    near, marked = np.array([v]), np.zeros(len(net.degree), np.bool_)
+    marked[v] = True
     for _ in range(rings):
         around = net.ring[near]
-        there = np.arange(around.shape[1]) < net.degree[near, None]
-        near = np.unique(np.concatenate([near, around[there]]))
+        marked[around[np.arange(around.shape[1]) < net.degree[near, None]]] = True
+        near = np.flatnonzero(marked)
     return near

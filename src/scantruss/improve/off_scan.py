@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..check.distances import POINT_BOX, POINTS_OF_PLANE, boxes_of, distances_to_planes, points_of_planes
+from ..check.distances import POINT_BOX, POINTS_OF_PLANE, distances_to_planes, kept_boxes_of, points_of_planes
 from ..check.limits import NOISES_OFF
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ def put_on_scan(mesh: WorkingMesh, samples: SurfaceSamples, settings: Settings) 
     Measured as the certificate does (`check.distances`): from the points, their noise aside.
     """
     net, points = mesh.net, points_of_planes(samples)
-    boxes = boxes_of(points, max(POINT_BOX * settings.length, 2.0 * samples.spacing))
+    boxes = kept_boxes_of(points, max(POINT_BOX * settings.length, 2.0 * samples.spacing), samples)
     movable = (net.degree > 0) & ~mesh.fixed & np.isfinite(mesh.projection_distance)
     if settings.boundary:
         movable &= net.is_open == 0

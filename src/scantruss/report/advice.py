@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -42,6 +42,7 @@ LAST_LENGTHS = (1.4, 2.0, 2.8)  # lengths that are tried where none has passed, 
 NEARLY_NEXT = 1.45  # ratio of lengths that pass up to which the longer one stands for the next to the shorter
 LINES_OF_A_SCANNER = 5  # fewest lines of points that may be those of a scanner
 NEXT_LENGTH = 1.4  # a length is suggested if that many times it passes too
+SAME_LENGTH = 1.03  # ratio of lengths up to which what has come of one stands for the other
 # lengths that are tried in place of one that failed
 NEARBY_LENGTHS = (1.12, 0.9, 1.25, 0.8, 1.4, 0.7, 1.7, 0.6, 2.0, 0.5, 2.8)
 # spacings in a member from which holes in the sampling are seldom taken for holes of the surface
@@ -173,7 +174,8 @@ class Advice:
             return known
         if length not in self._begun:
             settings = self._settings.replace(length=length)
-            self._begun[length] = (settings, attempts(self._cloud, settings), AttemptLimit())
+            trials = (replace(each, is_trial=True) for each in attempts(self._cloud, settings))
+            self._begun[length] = (settings, trials, AttemptLimit())
         settings, tried, limit = self._begun[length]
         before = limit.runs
         limit.allow(allowed)
@@ -313,11 +315,16 @@ class Advice:
 
     def next_above(self, length: float) -> float:
         """Return the next longer length to look at."""
-        return min(_two_digits(NEXT_LENGTH * length), max(length, length_range(self._cloud)[1]))
+        return self._as_tried(min(_two_digits(NEXT_LENGTH * length), max(length, length_range(self._cloud)[1])))
 
     def next_below(self, length: float) -> float:
         """Return the next shorter length to look at."""
-        return max(_two_digits(length / NEXT_LENGTH), min(length, length_range(self._cloud)[0]))
+        return self._as_tried(max(_two_digits(length / NEXT_LENGTH), min(length, length_range(self._cloud)[0])))
+
+    def _as_tried(self, length: float) -> float:
+        """Return the length that was tried already and is nearly the same, or else the same."""
+        nearest = min(self._found, key=lambda tried: abs(math.log(tried / length)), default=length)
+        return nearest if abs(math.log(nearest / length)) <= math.log(SAME_LENGTH) else length
 
     def around(self, length: float) -> list[float]:
         """Try the lengths of a table, one grid each, and return them: one, the two below and the two above."""
@@ -338,8 +345,9 @@ class Advice:
         """Rough area of the scan [scan unit^2]."""
         return sample_surface(self._cloud, self._settings.replace(length=self._usual)).area
 
+    @cached_property
     def radius(self) -> float:
-        """Return the radius to which nearly all of the scan is bent less [scan unit]; inf where all is flat."""
+        """The radius to which nearly all of the scan is bent less [scan unit]; inf where all is flat."""
         samples = sample_surface(self._cloud, self._settings.replace(length=self._usual))
         bend = float(np.quantile(measured_bends(samples.surface), CLOSE_BEND))
         return 1.0 / bend if bend > 0.0 else np.inf

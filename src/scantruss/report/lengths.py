@@ -17,7 +17,7 @@ MOST_WORDS = 2  # kinds of loss, or faults, that are named for a length
 
 def advice_rows(advice: Advice, length: float, cloud: PointCloud) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Return head and rows of a table: what comes of a member length, of those around it and of others that were tried."""
-    radius, unit = advice.radius(), f" [{cloud.unit}]" if cloud.unit else ""
+    radius, unit = advice.radius, f" [{cloud.unit}]" if cloud.unit else ""
     rows: list[tuple[str, ...]] = []
     advice.try_length(length)
     trials: dict[float, LengthTrial | None] = dict.fromkeys(advice.around(length))
@@ -78,7 +78,7 @@ def _why(trial: LengthTrial) -> str:
 
 def advice_lines(advice: Advice, length: float, cloud: PointCloud) -> list[str]:
     """Return how noisy and how bent the scan is, which lengths pass, and which to take."""
-    unit, radius = f" {cloud.unit}" if cloud.unit else "", advice.radius()
+    unit, radius = f" {cloud.unit}" if cloud.unit else "", advice.radius
     trial = next((each for each in advice.tried if each.length == length), None)
     bent = (
         f"R = {words_of_number(radius, 3)}{unit}: 95 % of the scan is bent less"

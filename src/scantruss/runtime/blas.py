@@ -7,14 +7,17 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
 from threading import RLock
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from threadpoolctl import ThreadpoolController
+if TYPE_CHECKING:
+    from threadpoolctl import ThreadpoolController
 
 
 @cache
 def _libraries() -> ThreadpoolController:
     """The libraries that numpy and scipy have loaded; found once, as it takes milliseconds."""
+    from threadpoolctl import ThreadpoolController  # which most grids do not load
+
     return ThreadpoolController()
 
 

@@ -46,6 +46,9 @@ from .supports import support_samples
 
 BESIDE_SAMPLES = 1.5  # distance from points of the boundary within which all points are used [`sample_spacing`]
 WITHOUT_COORDINATES = "with NaN or infinite coordinates"  # why points are not read
+POINTS_OF_KEPT_SAMPLES = (
+    500_000  # points of a cloud with which samples of several settings are kept, that often; else the last ones
+)
 PATCH_POINTS_TO_PROJECT = 24.0  # most points per sample to which a patch is fitted when nodes are projected
 
 
@@ -143,7 +146,7 @@ _OUTLIERS_OF_CLOUDS: weakref.WeakKeyDictionary[PointCloud, bool] = weakref.WeakK
 
 
 def sample_surface(cloud: PointCloud, settings: Settings) -> SurfaceSamples:
-    """Return the samples of a cloud for a member length, in search boxes (Eq. 1); kept as long as the cloud lives.
+    """Return the samples of a cloud for a member length, in search boxes (Eq. 1); the last are kept as long as the cloud lives.
 
     Parameters
     ----------
@@ -157,7 +160,9 @@ def sample_surface(cloud: PointCloud, settings: Settings) -> SurfaceSamples:
         asked = asked._replace(judge_always=_has_outliers(cloud))
     kept = _SAMPLES_OF_CLOUDS.setdefault(cloud, {})
     if asked not in kept:
-        kept.clear()
+        most = max(1, POINTS_OF_KEPT_SAMPLES // max(len(cloud.points), 1))
+        for oldest in list(kept)[: max(0, len(kept) + 1 - most)]:
+            del kept[oldest]
         made = _prepare(cloud.points, cloud.bounds, cloud.spacing, asked, given_normals(cloud))
         check_is_surface(made)
         unread = (*cloud.left_out, *((WITHOUT_COORDINATES, cloud.dropped) for _ in range(cloud.dropped > 0)))

@@ -30,13 +30,18 @@ class TriangleBoxes(NamedTuple):
 
 def triangle_boxes(nodes: np.ndarray, triangles: np.ndarray, box: float, reach: float) -> TriangleBoxes:
     """Return triangles (T, 3) of nodes (V, 3) by search boxes no larger than `box` [scan unit], unless some triangles are very long."""
-    corners = nodes[triangles]
-    middle = corners.mean(axis=1)
-    radius = np.sqrt(((corners - middle[:, None]) ** 2).sum(axis=2).max(axis=1))
-    lower, upper = corners.min(axis=(0, 1)) - reach, corners.max(axis=(0, 1)) + reach
-    sides = corners.max(axis=1) - corners.min(axis=1) + 2.0 * reach
+    a, b, c = (
+        nodes[triangles[:, k]] for k in range(3)
+    )  # by corners, as sums and extremes along rows of three are slow
+    middle = (a + b + c) / 3.0
+    squares = [(away**2).T for away in (a - middle, b - middle, c - middle)]
+    radius = np.sqrt(np.max([x + y + z for x, y, z in squares], axis=0))
+    least, most = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+    lower, upper = least.min(axis=0) - reach, most.max(axis=0) + reach
+    sides = most - least + 2.0 * reach
     for _ in range(BOX_GROWTHS):
-        if (sides / box + 1.0).prod(axis=1).sum() <= MOST_ENTRIES * len(triangles):
+        x, y, z = (sides / box + 1.0).T
+        if (x * y * z).sum() <= MOST_ENTRIES * len(triangles):
             break
         box *= 2.0
     empty = new_boxes(lower, upper, box, 1, 1)

@@ -5,6 +5,8 @@
 
 from __future__ import annotations
 
+import hashlib
+
 import numpy as np
 
 from ...kernels.geometry.components import component_labels
@@ -56,9 +58,10 @@ def some_stand_alone(points: np.ndarray, spacing: float) -> bool:
     """
     if spacing <= 0.0:
         return False
-    if np.ptp(points, axis=0).max() > MOST_BOXES * SAMPLES_APART * spacing:  # some lie far from all others
+    bounds = bounds_of(points)
+    if (bounds[1] - bounds[0]).max() > MOST_BOXES * SAMPLES_APART * spacing:  # some lie far from all others
         return True
-    some = points[streamlined(points, bounds_of(points), SAMPLES_APART * spacing)]
+    some = points[streamlined(points, bounds, SAMPLES_APART * spacing)]
     within = NEIGHBORS_WITHIN * spacing
     box = number_in_boxes(some, within / np.sqrt(3.0))  # as wide as that points of a box are no farther apart
     in_doubt = some[np.bincount(box)[box] <= ENOUGH_AROUND]
@@ -82,13 +85,31 @@ def find_outliers(points: np.ndarray, distance: float) -> np.ndarray:
     points : (N, 3) [scan unit]
     distance : as `Settings.outlier_distance`
     """
-    return judge_points(points, distance)[0]
+    return _judged(points, distance)[0]
 
 
-def judge_points(points: np.ndarray, distance: float, length: float = np.inf) -> tuple[np.ndarray, np.ndarray]:
-    """Return which points are outliers, and which others lie too far apart for a member length [scan unit]; (N,) bool each."""
+#: what was found of the last points, by their contents and the distance
+_LAST_JUDGED: dict[tuple[bytes, float], tuple[np.ndarray, np.ndarray]] = {}
+
+
+def judge_points(points: np.ndarray, distance: float, length: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return which points are outliers, and which others lie too far apart for a member length [scan unit]; (N,) bool each.
+
+    What was found of the last points is kept, as several lengths of one scan are often tried; they are known by their contents.
+    """
+    asked = hashlib.sha256(np.ascontiguousarray(points).data).digest(), distance
+    if asked not in _LAST_JUDGED:
+        _LAST_JUDGED.clear()
+        _LAST_JUDGED[asked] = _judged(points, distance)
+    outlier, reach = _LAST_JUDGED[asked]
+    far = reach > max(FARTHEST_APART * length, distance * float(np.median(reach))) if len(reach) else outlier
+    return outlier, ~outlier & far
+
+
+def _judged(points: np.ndarray, distance: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return which points are outliers (N,) bool, and the reach of each with all others there (N,) [scan unit]."""
     if len(points) <= NEIGHBORS_OF_A_POINT:
-        return np.zeros(len(points), np.bool_), np.zeros(len(points), np.bool_)
+        return np.zeros(len(points), np.bool_), np.zeros(len(points))
     near = Nearby.of(points)
     alive = np.ones(len(points), np.bool_)
     which = np.arange(len(points))
@@ -123,8 +144,7 @@ def judge_points(points: np.ndarray, distance: float, length: float = np.inf) ->
         alive[found] = False
     doubted = np.flatnonzero(~alive)
     alive[doubted[_on_sheets(near, alive, first_reach, doubted)]] = True
-    sparse = alive & (first_reach > max(FARTHEST_APART * length, distance * float(np.median(first_reach))))
-    return near.in_order(~alive), near.in_order(sparse)
+    return near.in_order(~alive), near.in_order(first_reach)
 
 
 def _on_sheets(near: Nearby, alive: np.ndarray, reach: np.ndarray, doubted: np.ndarray) -> np.ndarray:
