@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from itertools import islice
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -12,14 +14,16 @@ from typed import known
 import scantruss as st
 from scantruss.attempts import attempts
 from scantruss.check.distances import boxes_of
+from scantruss.check.gaps import openings_closed
 from scantruss.cli.main import main
 from scantruss.cli.shared import box_around
+from scantruss.grid.certificate import LeftOut
 from scantruss.kernels.surface.rods import spreads_around
 from scantruss.scan.member_length import length_range
-from scantruss.surface.chosen_samples import ROD
+from scantruss.surface.chosen_samples import KEPT, ROD
 from scantruss.surface.linked_samples import link_samples
 from scantruss.surface.rods import LENGTH_STEP, lengths_of_rods, rod_points
-from scantruss.surface.samples import sample_surface
+from scantruss.surface.samples import SurfaceSamples, sample_surface
 from scantruss.surface.supports import support_samples
 
 LENGTH = 1.4
@@ -83,6 +87,15 @@ def test_a_hall_gets_grids_of_roof_and_floor_and_the_columns_are_told(hall: tupl
     (part,) = (part for part in known(grid.certificate).left_out if part.kind == "rods")
     assert 0.8 * column.sum() < part.points < 1.1 * column.sum() and not part.asked
     assert any(warning.kind == "left out" for warning in known(grid.certificate).warnings)
+
+
+@pytest.mark.parametrize(("reason", "words"), [(ROD, "where a column"), (KEPT, "shorter members leave it open")])
+def test_a_place_that_was_closed_under_a_column_is_no_opening(reason: int, words: str) -> None:
+    """Shorter members do not open it."""
+    samples = cast(SurfaceSamples, SimpleNamespace(scan=np.zeros((5, 3)), judged=np.full(5, reason), origin=np.ones(3)))
+    hole = LeftOut("hole", 1, 0.0, (1.5, 1.0, 1.0), 0.8)
+    (warning,) = openings_closed([hole], [], samples, LENGTH, "m")
+    assert words in warning.words and "0.8 m" in warning.words and warning.where == hole.where
 
 
 def test_a_hall_is_tried_without_its_columns_right_after_the_first_grid(hall: tuple[np.ndarray, np.ndarray]) -> None:

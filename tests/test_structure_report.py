@@ -88,6 +88,14 @@ def test_a_page_holds_everything_and_asks_the_network_for_nothing(place: Path) -
     assert Path("a.html").stat().st_size < 700_000
 
 
+def test_stability_is_said_not_to_have_been_looked_at_unless_it_was(place: Path) -> None:
+    for modes, looked_at in (("", False), ("--buckling 1", True)):
+        assert run(f"b.html --loads {LOADS} {modes}") == 0
+        text = Path("b.html").read_text()
+        assert ("5.2.1(3)" in text) == looked_at
+        assert ("the stability of the whole (buckling modes)" in text) != looked_at
+
+
 def test_the_settings_of_a_report_make_the_same_structure(place: Path) -> None:
     assert run(f"a.html a.json --loads {LOADS} --section SHS100x5 --support-type fixed") == 0
     text = next(part for part in read("a.html").text if "# structure.toml" in part)

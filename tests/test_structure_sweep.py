@@ -9,8 +9,10 @@ from small_grids import dome
 
 import scantruss as st
 from scantruss.cli.main import main
+from scantruss.report.choosing import rows_of as table_rows
 from scantruss.structure.options import StructureSettings
 from scantruss.structure.variants import VariantFigures, Variants, lightest, solve_variants
+from scantruss.sweep import FIGURES, Outcome, Trial
 
 SETTINGS = """
 unit = "m"
@@ -58,6 +60,13 @@ def test_every_length_support_and_rise_is_a_row_and_the_lightest_is_named(
     assert main(words.split()) == 0  # over its own results
     assert main(f"{RUN.partition(' --structure')[0]} --length 3,4".split()) == 0
     assert not Path("out/structures.csv").exists()
+
+
+def test_a_grid_that_passed_with_warnings_is_said_to() -> None:
+    figures = ("",) * len(FIGURES)
+    outcomes = [Outcome(figures=figures, warnings=count) for count in (0, 1, 3)] + [Outcome(fault="no grid")]
+    rows = table_rows([Trial("a", "a", ("1",), st.Settings(length=1.0))] * 4, outcomes)
+    assert [row[-1] for row in rows] == ["passed", "passed with 1 warning", "passed with 3 warnings", "no grid"]
 
 
 def test_a_row_is_what_the_command_structure_finds(place: Path, capsys: pytest.CaptureFixture[str]) -> None:

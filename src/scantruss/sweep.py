@@ -36,6 +36,7 @@ class Outcome:
     grid: bytes = b""  #: JSON file
     picture: bytes = b""  #: PNG file
     figures: tuple[str, ...] = ()  #: as in `FIGURES`
+    warnings: int = 0  #: of the certificate
     structures: tuple[VariantFigures, ...] = ()  #: of the grid, where they are asked for
 
 
@@ -114,6 +115,7 @@ def try_settings(job: tuple[Settings, Variants | None], cloud: PointCloud) -> Ou
         grid=encode_json(grid),
         picture=encode_picture(grid, cloud),
         figures=_figures(grid),
+        warnings=len(grid.certificate.warnings) if grid.certificate else 0,
         structures=solve_variants(grid, variants) if variants else (),
     )
 

@@ -118,7 +118,7 @@ class Judged:
         slits, narrow, parts = narrow_gaps(grid, samples, found, [*closed, *gaps], length)
         bridged = [each for each in bridged if each.kind == "bridged" or not each.is_said_by(parts)]
         holes = [*closed, *first_and_more([*(gap for gap in gaps if gap not in parts), *slits])]
-        lids = openings_closed(holes, [*bridged, *narrow], length, grid.unit)
+        lids = openings_closed(holes, [*bridged, *narrow], samples, length, grid.unit)
         return replace(
             self.certificate,
             left_out=(*self.certificate.left_out, *holes),

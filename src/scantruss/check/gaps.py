@@ -10,6 +10,7 @@ from ..grid.certificate import Fault, LeftOut, place_of
 from ..kernels.geometry.boxes import SearchBoxes
 from ..kernels.geometry.components import component_labels
 from ..kernels.mesh.coverage import nearest_distances
+from ..surface.chosen_samples import LIMB, ROD
 from .distances import POINT_BOX, boxes_of
 from .limits import PLACES_KEPT
 
@@ -113,7 +114,9 @@ def bridged_gaps(
     return [gap for _, gap, _, _ in found], warnings
 
 
-def openings_closed(holes: list[LeftOut], said: list[Fault], length: float, unit: str) -> list[Fault]:
+def openings_closed(
+    holes: list[LeftOut], said: list[Fault], samples: SurfaceSamples, length: float, unit: str
+) -> list[Fault]:
     """Return a warning of the openings that a grid closes though nobody asked for it, and that are not small; none of those said."""
     known = {place for fault in said for place in (fault.where, *fault.also)}
     wide = [
@@ -126,8 +129,22 @@ def openings_closed(holes: list[LeftOut], said: list[Fault], length: float, unit
     wide.sort(key=lambda hole: -(hole.size or 0.0))
     places, count = [hole.where for hole in wide if hole.where], sum(hole.number for hole in wide)
     more = f" ({count} such places)" if count > 1 else ""
-    words = f"closes an opening {wide[0].size:.3g}{unit and ' ' + unit} across{more}; shorter members leave it open"
+    what = f"{wide[0].size:.3g}{unit and ' ' + unit} across"
+    left = samples.scan[(samples.judged == ROD) | (samples.judged == LIMB)]
+    of_rods = all(
+        _has_points_within(left, np.array(hole.where) - samples.origin, hole.size) for hole in wide if hole.where
+    )
+    words = (
+        f"closes a place {what}, where a column or the like was left out{more}"
+        if of_rods
+        else f"closes an opening {what}{more}; shorter members leave it open"
+    )
     return [Fault("closed", words, places[0] if places else None, tuple(places[1:PLACES_KEPT]))]
+
+
+def _has_points_within(points: np.ndarray, place: np.ndarray, reach: float | None) -> bool:
+    """Whether any of the points (N, 3) lies within reach of a place (3,)."""
+    return bool((((points - place) ** 2).sum(axis=1) <= (reach or 0.0) ** 2).any())
 
 
 def _nearest(places: np.ndarray, points: np.ndarray, boxes: SearchBoxes, spacing: float) -> np.ndarray:

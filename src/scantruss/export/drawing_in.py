@@ -69,7 +69,9 @@ def grid_of_drawing(drawing: Drawing, name: str, merge: float | None = None) -> 
         raise FormatError(f"--merge must be a distance of 0 or more, got {merge!r}")
     pairs = np.concatenate([drawing.lines, sides_of(drawing.faces)]).astype(np.int64)
     if not len(pairs):
-        raise FormatError(f"{name} has no lines and no faces{drawing.left}; a grid needs them")
+        raise FormatError(
+            f"{name} has no lines and no faces{drawing.left}; a grid needs them (scantruss grid makes one of a scan)"
+        )
     if not np.isfinite(drawing.points[pairs]).all():
         raise FormatError(f"{name} has an end that is not a number; export it again")
     median = float(np.median(np.linalg.norm(drawing.points[pairs[:, 1]] - drawing.points[pairs[:, 0]], axis=1)))

@@ -36,9 +36,14 @@ def rows_of(trials: Sequence[Trial], outcomes: Sequence[Outcome]) -> list[tuple[
     """Return a row for each trial; one without a grid says why."""
     none = ("",) * len(FIGURES)
     return [
-        (*trial.varied, *(outcome.figures or none), outcome.fault or "passed")
+        (*trial.varied, *(outcome.figures or none), outcome.fault or _passed(outcome.warnings))
         for trial, outcome in zip(trials, outcomes, strict=True)
     ]
+
+
+def _passed(warnings: int) -> str:
+    """Return the verdict on a grid that passed with so many warnings."""
+    return f"passed with {warnings} warning{'s' * (warnings > 1)}" if warnings else "passed"
 
 
 def structure_table(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
@@ -59,7 +60,9 @@ class DesignTab:
         try:
             length = float(self.length.value)
         except ValueError:
-            raise InputError(f"length needs a number, got {self.length.value!r}") from None
+            wish = self.length.value.replace(",", ".", 1)
+            comma = f"; write {wish} with a point" if re.fullmatch(r"\s*\d+\.\d+\s*", wish) else ""
+            raise InputError(f"length needs a number, got {self.length.value!r}{comma}") from None
         self.view.session.set_length(length)
 
     def fill(self, before: StudioState | None, state: StudioState) -> None:

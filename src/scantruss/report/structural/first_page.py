@@ -16,11 +16,11 @@ from .words import load_words, support_words
 
 CLAUSES_USED = (
     ("EN 1993-1-1 table 5.2", "class of the section"),
-    ("EN 1993-1-1 5.2.1(3)", "least factor of linear buckling"),
     *((f"EN 1993-1-1 {clause.partition(' ')[0]}", clause.partition(" ")[2]) for clause in CLAUSES),
     ("EN 1990 6.10, table A1.2(B)", "ULS, psi 0 of table A1.1"),
     ("EN 1990 6.14b", "SLS, characteristic"),
 )
+OF_BUCKLING = ("EN 1993-1-1 5.2.1(3)", "least factor of linear buckling")
 OF_I_SECTIONS = ("EN 1993-1-1 6.3.2.2", "lateral torsional buckling")
 
 
@@ -39,10 +39,12 @@ def first_page(source: ReportSource) -> Iterator[ReportPart]:
     if report.utilization is not None and not report.warnings:
         yield Sentence("Every check that is listed below is met.")
     yield SectionHead("Assumptions")
-    yield PointList(tuple(_assumptions(truss, settings)))
+    stability = report.buckling is not None or report.path is not None
+    yield PointList(tuple(_assumptions(truss, settings, stability)))
     if report.utilization is not None:
         yield SectionHead("Clauses")
-        used_clauses = [*CLAUSES_USED, *[OF_I_SECTIONS] * any(section.shape == "I" for section in truss.sections)]
+        used_clauses = [*CLAUSES_USED, *[OF_BUCKLING] * (report.buckling is not None)]
+        used_clauses += [OF_I_SECTIONS] * any(section.shape == "I" for section in truss.sections)
         half = -(-len(used_clauses) // 2)
         pairs = zip(used_clauses[:half], [*used_clauses[half:], ("", "")][:half], strict=True)
         head = ("clause", "what for", "clause", "what for")
@@ -98,8 +100,8 @@ def _governing(report: StructureReport) -> str:
     return f"{report.truss.member_marks[most]}, {report.governing[most]}"
 
 
-def _assumptions(truss: Truss, settings: StructureSettings) -> Iterator[str]:
-    """Yield what was taken for granted, one sentence each."""
+def _assumptions(truss: Truss, settings: StructureSettings, stability: bool) -> Iterator[str]:
+    """Yield what was taken for granted, one sentence each; stability : whether that of the whole was looked at."""
     checks: MemberChecks = settings.checks
     joints = {"rigid": "rigid joints", "pinned": "pinned joints, axial forces only"}.get(
         settings.joints or ("pinned" if settings.double_layer else "rigid"),
@@ -126,4 +128,8 @@ def _assumptions(truss: Truss, settings: StructureSettings) -> Iterator[str]:
         f"Buckling length {checks.effective_length:g} times the system length; gamma M0 {checks.gamma_m0:g}, gamma M1"
         f" {checks.gamma_m1:g}; limits: slenderness {checks.slenderness:g}, displacement span/{checks.deflection:g}."
     )
-    yield "Not looked at: plasticity, the size and strength of joints, fire, earthquakes. It does not replace the judgement of an engineer."
+    whole = "" if stability else "the stability of the whole (buckling modes), "
+    yield (
+        f"Not looked at: {whole}plasticity, the size and strength of joints, fire, earthquakes."
+        " It does not replace the judgement of an engineer."
+    )

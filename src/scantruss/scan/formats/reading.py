@@ -155,6 +155,8 @@ def read_content(path: Path, wanted: Sequence[str] = (), places_of: Places | Non
         except KeyError:
             known = " ".join(sorted(READERS))
             near = nearest_suffix(path, READERS)
+            if path.suffix.lower() == ".json":
+                near = "; a grid or a structure goes to scantruss structure, schedule or convert"
             raise FormatError(f'no reader for "{path.suffix}" ({path.name}); use one of {known}{near}') from None
         try:
             with np.errstate(all="ignore"):  # values that are not finite are counted and left out later
