@@ -56,6 +56,21 @@ def rods_of(points: np.ndarray, length: float) -> np.ndarray:
     return rod_points(link_samples(cloud.points, 0.2 * length, length, cloud.spacing), len(points), length)
 
 
+@pytest.mark.parametrize("length", [1.0, 1.2, LENGTH])
+def test_a_column_that_goes_on_above_its_roof_is_left_out_there_too(length: float) -> None:
+    rng = np.random.default_rng(7)
+    columns = np.concatenate([pole(rng, x, y, 0.0, 6.2, 0.25, 1200) for x in (-6, 6) for y in (-4, 4)])
+    floor = np.column_stack([rng.uniform(-11, 11, 9000), rng.uniform(-8, 8, 9000), rng.normal(0.0, 0.004, 9000)])
+    points = np.concatenate([roof(rng), floor, columns])
+    above = points[:, 2] > 6.4 - 0.03 * points[:, 0] ** 2 - 0.04 * points[:, 1] ** 2
+    above[: -len(columns)] = False
+    rod = rods_of(points, length)
+    assert above.sum() > 500 and rod[above].all()
+    assert rod[: -len(columns)].mean() < 0.01
+    x, y, z = st.grid_from_points(points, st.Settings(length=length, effort="quick")).scan_nodes.T
+    assert np.minimum(np.abs(z), np.abs(z - 6.0 + 0.03 * x * x + 0.04 * y * y)).max() < 0.15
+
+
 def test_columns_are_rods_and_roof_and_floor_are_none(hall: tuple[np.ndarray, np.ndarray]) -> None:
     points, column = hall
     rod = rods_of(points, LENGTH)

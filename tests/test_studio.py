@@ -18,6 +18,7 @@ from scantruss.cli.main import main
 from scantruss.pipeline import grid_from_cloud
 from scantruss.report.advice import Advice
 from scantruss.runtime.progress import Progress
+from scantruss.studio.head import words_of_session
 from scantruss.studio.in_order import InOrder
 from scantruss.studio.project import read_project
 from scantruss.studio.session import Session
@@ -369,5 +370,6 @@ def test_the_length_that_is_tried_is_that_of_info_and_can_be_undone(tmp_path: Pa
     assert session.settings.length == Advice(cloud, session.settings).suggest() != before
     assert session.grid is not None and session.grid.certificate is not None and session.grid.certificate.passed
     assert session.grid.settings is not None and session.grid.settings.length == session.settings.length
+    assert words_of_session(session).endswith(f"{session.settings.length:g} is taken")
     session.undo()
-    assert session.settings.length == before
+    assert session.settings.length == before and "taken" not in words_of_session(session)

@@ -40,6 +40,8 @@ def words_of_session(session: Session) -> str:
         return "stopping" if session.worker.is_stopping else escape(session.stage)
     if session.was_stopped:
         return "stopped; what was there before is kept"
+    if session.found[0] is session.state:
+        return escape(session.found[1])
     if session.state.is_stale:
         return "The grid was made before the last change: press <b>Generate</b>"
     if session.state.is_structure_stale:

@@ -24,7 +24,7 @@ from .compare import kept_design, taken_design
 from .features import Feature, corners_of, find_features, switched_off
 from .outputs import EFFORT_OF_PREVIEW, command_of, files_of, model_to_show
 from .solving import check_words, solved_state
-from .state import NO_GRID
+from .state import NO_GRID, StudioState
 from .support_places import placed, supports_on
 from .trade_steps import TradeSteps
 
@@ -42,6 +42,7 @@ class Session(TradeSteps):
         self.wants_features = False  #: whether holes and ridges are looked for after each grid
         self._features_of: tuple[PointCloud, Settings] | None = None
         self._corners: tuple[PointCloud, Settings, np.ndarray] | None = None
+        self.found: tuple[StudioState | None, str] = None, ""  #: what was found out, and the state of which that is so
         self.front: tuple[np.ndarray, np.ndarray] | None = None  #: nodes and triangles of a front that advances
         self._front_seen = 0.0
 
@@ -113,6 +114,8 @@ class Session(TradeSteps):
             self.change("length tried", settings=self.state.with_main_length(length))
         self.save()
         self._make(EFFORT_OF_PREVIEW, progress, live=True)
+        passed = sum(trial.passed for trial in advice.tried)
+        self.found = self.state, f"{len(advice.tried)} lengths tried, {passed} pass; {length:g} is taken"
 
     def paint(self, made: Settings) -> None:
         """Take settings with other lengths at some places; the length elsewhere stays."""

@@ -23,6 +23,11 @@ FINE_LENGTH = 24.0  # shortest length at which rods of long members are looked f
 LENGTH_STEP = 1.6  # step from one such length to the next
 NEAR_RODS = 3.0  # distance between samples that are beside each other there [sample radii]
 AREA_OF_REST = 1.0  # area of a part beside rods below which it is a piece of them [square of the member length]
+BEHIND_WIDTH = 1.25  # distance from its axis within which a rod goes on behind a sheet [half its width]
+TILT = 0.06  # by which that axis may be wrong, as it is taken from a part of a rod [rad]
+FEWEST_OF_STRAIGHT = 12  # fewest samples of a rod whose axis is known
+WIDEST_ROD = 0.4  # half the width of what goes on, at most [member lengths]
+STUB = 0.4  # distance from the sheet that a rod behind it reaches at least [member lengths]
 ROD_DISTANCE = 0.8  # distance from all sheets at which a rod stands at one place at least [member lengths]
 
 
@@ -60,6 +65,7 @@ def rod_points(found: Linked, points: int, length: float, supports: np.ndarray |
             break
         rod |= ends
     rod &= _long_groups(found, rod, known, length)
+    rod |= _behind_sheets(found, rod, length)
     if rod.mean() > MOST_RODS:
         rod[:] = False
     marked: np.ndarray = np.where(found.owner >= 0, rod[found.owner], False)
@@ -109,6 +115,38 @@ def _long_groups(found: Linked, rod: np.ndarray, known: np.ndarray, length: floa
     long[label[known]] = True
     marked: np.ndarray = long[label]
     return marked
+
+
+def _behind_sheets(found: Linked, rod: np.ndarray, length: float) -> np.ndarray:
+    """Return which samples (S,) bool continue a straight rod along its axis: a column that goes on above its roof."""
+    beside = found.neighbors
+    one, other = np.nonzero((beside >= 0) & rod[:, None] & rod[beside])
+    label = component_labels(len(rod), one, beside[one, other])
+    goes_on = np.zeros(len(rod), np.bool_)
+    along_axes: list[np.ndarray] = []
+    for group in np.unique(label[rod]):
+        own = rod & (label == group)
+        if own.sum() < FEWEST_OF_STRAIGHT:
+            continue
+        middle = found.mean[own].mean(axis=0)
+        variances, axes = np.linalg.eigh(np.cov(found.mean[own] - middle, rowvar=False))
+        at = (found.mean - middle) @ axes[:, 2]
+        away = np.linalg.norm(found.mean - middle - at[:, None] * axes[:, 2], axis=1)
+        width = float(np.median(away[own]))  # of most of it, without what was taken of a sheet where it ends
+        if not _thin(variances[None])[0] or width > WIDEST_ROD * length:  # several, as the frames of a scaffold
+            continue
+        near = away <= BEHIND_WIDTH * width + TILT * np.abs(at)
+        along_axes.append(~rod & near & (np.abs(at) < np.abs(at[own]).max() + 2.0 * float(np.ptp(at[own]))))
+    if along_axes:
+        alive = ~rod & ~np.logical_or.reduce(along_axes)
+        spreads, off, count = _spreads(found, alive, COARSE_REACH * length)
+        stands_off = (off > np.maximum(END_OFFSET * length, 2.0 * np.sqrt(spreads[:, 0]))) | (count < SAMPLES_OF_SHEET)
+        for part in along_axes:
+            if (
+                off[part & (count >= SAMPLES_OF_SHEET)] > STUB * length
+            ).any():  # else it is the sheet where the rod ends
+                goes_on |= part & stands_off
+    return goes_on
 
 
 def _thin(spreads: np.ndarray) -> np.ndarray:
