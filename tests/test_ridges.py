@@ -28,7 +28,7 @@ from scantruss.kernels.surface.ridges import (
     fold_error,
     turned_frame,
 )
-from scantruss.kernels.surface.turned_folds import smooth_part, turned_fold_error
+from scantruss.kernels.surface.turned_folds import TABLE_COLUMNS, smooth_part, turned_fold_error
 from scantruss.surface.samples import sample_surface
 
 SIZE = 5.0  # member length of all shapes here
@@ -308,7 +308,8 @@ def test_the_error_of_a_turned_fold_is_the_same_once_the_quadrics_are_taken_out(
     buffer[:, :3] = rng.uniform(-1, 1, (60, 3)) * [0.8, 0.8, 0.3]
     buffer[:, WEIGHT] = rng.uniform(0.1, 1, 60)
     across, normal, radius = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0), rng.uniform(0.7, 1.0)
-    table, squares = smooth_part(buffer, 60, turned_frame(across, normal, 0.0), radius)
+    table = np.empty((60, TABLE_COLUMNS))
+    squares = smooth_part(buffer, turned_frame(across, normal, 0.0), radius, table)
     matrix = np.empty((TERMS, TERMS + 1))
     for rounding in (0.0, 0.1, 0.3):
         angle, shift = rng.uniform(-1.5, 1.5), rng.uniform(-0.4, 0.4)

@@ -23,6 +23,7 @@ from scantruss.studio.colours import (
     colors_of,
     colors_of_scan,
     histogram_of,
+    marked,
     rgb_of,
 )
 from scantruss.studio.frame import distance_to_see
@@ -346,12 +347,14 @@ def test_a_turntable_shows_all_of_the_scan_and_little_more() -> None:
 
 def test_bars_stand_for_the_values_that_they_hold() -> None:
     values = np.array([1.0, 2.0, 2.0, 2.4, 3.0, np.nan, 9.0])
-    html = histogram_of(values, 1.0, 9.0, False, (2.0, 3.0))
+    html = histogram_of(values, 1.0, 9.0, lambda middles: colors_of(middles, None, (1.0, 9.0))[0], (2.0, 3.0))
     bars = re.findall(r'title="(\d+)" data-field="between" data-low="(\S+)" data-high="(\S+)".*?opacity:([\d.]+)', html)
     held = [(int(count), float(low), float(high)) for count, low, high, _ in bars if int(count)]
     assert held == [(1, 1.0, 1.0), (2, 2.0, 2.0), (1, 2.4, 2.4), (1, 3.0, 3.0), (1, 9.0, 9.0)]
     clear = [float(low) for count, low, _, opacity in bars if int(count) and opacity == "1"]
     assert clear == [2.0, 2.4, 3.0]
+    red = histogram_of(values, 1.0, 9.0, lambda middles: marked(colors_of(middles, None)[0], middles, 3.0, "#d81e2c"))
+    assert red.count("background:rgb(216,30,44)") == 18  # of 24 bars those above 3
 
 
 def test_a_slider_has_as_many_decimals_as_its_step_needs() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -98,22 +98,34 @@ def rgb_of(color: str) -> tuple[int, int, int]:
     return red, green, blue
 
 
+def marked(colors: np.ndarray, values: np.ndarray, most: float, color: str) -> np.ndarray:
+    """Return colours (N, 3) of values (N,) with another one, such as #d81e2c, where a value is above `most`."""
+    above = np.nan_to_num(values) > most
+    return np.where(above[:, None], rgb_of(color), colors).astype(np.uint8) if above.any() else colors
+
+
 def histogram_of(
-    values: np.ndarray, low: float, high: float, diverging: bool, chosen: tuple[float, float] | None = None
+    values: np.ndarray,
+    low: float,
+    high: float,
+    color_of: Callable[[np.ndarray], np.ndarray],
+    chosen: tuple[float, float] | None = None,
 ) -> str:
-    """Return a histogram of values between the ends of the scale as HTML, its bars in the colours of the scale.
+    """Return a histogram of values from `low` to `high` as HTML, its bars in the colours of the drawing.
 
     A click on a bar, or dragging from one to another, gives their values to the field `BRUSHED`.
 
     Parameters
     ----------
+    color_of : callable
+        ``color_of(values)`` (K, 3) uint8.
     chosen : (float, float), optional
         Outside of which bars are faint.
     """
     known = np.sort(values[np.isfinite(values)])
     counts, ends = np.histogram(known, BARS, (low, high if high > low else low + 1.0))
     after = np.cumsum(counts) + np.searchsorted(known, low)
-    colors = ramp((np.arange(BARS) + 0.5) / BARS, DIVERGING if diverging else RISING)
+    colors = color_of(0.5 * (ends[1:] + ends[:-1]))
     held = [  # by each bar: its values, or where there are none its ends
         (known[end - count], known[end - 1]) if count else (begin, stop)
         for count, end, begin, stop in zip(counts, after, ends[:-1], ends[1:], strict=True)

@@ -9,7 +9,7 @@ import numpy as np
 from ..export.page_tables import PageColumn, colorings_of
 from ..grid.panels import panel_of_triangles
 from .certificate_list import CertificateList
-from .colours import BRUSHED, DIMMED, colors_of, histogram_of, legend_of, legend_of_names, rgb_of, values_of
+from .colours import BRUSHED, DIMMED, colors_of, histogram_of, legend_of, legend_of_names, marked, rgb_of, values_of
 from .drawn_lines import numbers_of
 from .frame import SectionPlane
 from .legend import ColourLegend
@@ -169,7 +169,7 @@ class GridTab:
             if high > most:
                 scale_ends = (min(low, most), most)
             own, *shown_ends = colors_of(self._values, middle, scale_ends)
-            own[self._values > most] = rgb_of(too_much) if high > most else 0
+            own = marked(own, self._values, most, too_much)
             legend = legend_of(self.coloring.value, unit, shown_ends[0], shown_ends[1], middle is not None)
             if high > most:
                 legend = legend.with_mark(rgb_of(too_much), f"more than {most:g}")
@@ -178,8 +178,13 @@ class GridTab:
             self.legend.content = legend.html()
             begin, end = self.range.value
             is_whole = begin <= low and end >= high
+            scale = shown_ends[0], shown_ends[1]
             self.bars.content = histogram_of(
-                self._values, low, high, middle is not None, None if is_whole else (begin, end)
+                self._values,
+                low,
+                high,
+                lambda values: marked(colors_of(values, middle, scale)[0], values, most, too_much),
+                None if is_whole else (begin, end),
             )
             selected = None if is_whole else (self._values >= begin) & (self._values <= end)
             colors[choice["kind"]] = drawn_colors(own, selected)

@@ -18,7 +18,7 @@ from ...runtime.jit import kernel
 from ..geometry.quadric import WEIGHT, solve
 from ..geometry.vectors import Vector, along, cross, dot, norm, row, subtract, unit
 from .local_surface import Surface, flood, gather_points, walk
-from .turned_folds import smooth_part, turned_fold_error
+from .turned_folds import TABLE_COLUMNS, smooth_part, turned_fold_error
 
 EITHER_SIDE = -2.0  # no cosine is so low: the points of both sides of a ridge count
 TERMS = 8  # terms of the folded surface: k0 to k7
@@ -275,7 +275,8 @@ def fit_fold(
     if taken < 30 or norm(c) < 0.5:
         return False
     matrix = np.empty((TERMS, TERMS + 1))
-    table, squares = smooth_part(buffer, taken, turned_frame(c, n, 0.0), radius)
+    table = np.empty((taken, TABLE_COLUMNS))
+    squares = smooth_part(buffer, turned_frame(c, n, 0.0), radius, table)
     angle = shift = 0.0
     reach, swing = 0.4, 0.35
     least = np.inf

@@ -15,16 +15,15 @@ PLACE_X, PLACE_Y, REST, ROOT_OF_WEIGHT, TABLE_COLUMNS = 6, 7, 8, 9, 10  # column
 
 
 @kernel
-def smooth_part(
-    buffer: np.ndarray, taken: int, frame: tuple[Vector, Vector, Vector], radius: float
-) -> tuple[np.ndarray, float]:
-    """Return what is left of the points once their heights are freed of a quadric: a table (P, TABLE_COLUMNS), and the sum of squares.
+def smooth_part(buffer: np.ndarray, frame: tuple[Vector, Vector, Vector], radius: float, table: np.ndarray) -> float:
+    """Return what is left, as a sum of squares, of the heights of the first P points once they are freed of a quadric.
 
-    Its columns are an orthonormal basis of the quadrics, k0 to k5 whichever way the line runs (modified Gram-Schmidt), the place (x, y)
-    of each point across and along [radius], its height that is left, and the root of its weight.
+    table : (P, TABLE_COLUMNS), filled. Its columns are an orthonormal basis of the quadrics, k0 to k5 whichever way the line runs
+        (modified Gram-Schmidt), the place (x, y) of each point across and along [radius], its height that is left, and the root of its
+        weight.
     """
     c, e, n = frame
-    table = np.empty((taken, TABLE_COLUMNS))
+    taken = len(table)
     whole = squares = 0.0
     for i in range(taken):
         d = (buffer[i, 0], buffer[i, 1], buffer[i, 2])
@@ -48,7 +47,7 @@ def smooth_part(
         scale = 0.0 if squares <= 1e-9 * whole else 1.0 / math.sqrt(squares)
         for i in range(taken if k < QUADRICS else 0):
             table[i, column] *= scale
-    return table, squares
+    return squares
 
 
 @kernel
