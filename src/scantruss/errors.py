@@ -14,6 +14,7 @@ A message says what was got, what is needed and what to do, in one line.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from typing import Any
 
@@ -78,6 +79,12 @@ def words_of_number(value: float, digits: int) -> str:
     """Return a number with so many digits for a reader: 1440, where a format alone would say 1.44e+03."""
     short = f"{value:.{digits}g}"
     return f"{float(short):.0f}" if "e+" in short and abs(value) < MOST_WRITTEN_OUT else short
+
+
+def decimal_comma_words(text: str) -> str:
+    """Return what to write in place of a number with a decimal comma, to follow what is needed; nothing for any other text."""
+    text = text.strip()
+    return f"; write {text.replace(',', '.')} with a point, not {text}" if re.fullmatch(r"[-+]?\d*,\d+", text) else ""
 
 
 def unit_words(unit: str, power: int = 1) -> str:

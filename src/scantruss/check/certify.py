@@ -28,7 +28,7 @@ from .irregular import count_irregular
 from .left_out import closed_holes, first_and_more, parts_left_out
 from .limits import NOISES_OFF, ROUNDED_BY, limits_of, places_to_look_at, widened_limits
 from .sheets import cut_apart, faults_on_sheets, nodes_of_samples
-from .slits import narrow_gaps
+from .slits import feet_on, narrow_gaps
 from .steps import unfollowed_steps
 from .unfollowed import mostly_unfollowed, rounded_peaks, unfollowed_parts
 
@@ -99,6 +99,7 @@ class Judged:
         followed = _to_follow(samples)
         missed_at = place_of(samples.scan[_missed(found, followed, members)] + samples.origin)
         rough = samples.moved  # then its roughness is the scatter
+        feet = feet_on(grid, samples, found, length)
         offsets, (gaps, bridged), doubtful, aside, beyond, beside, apart, off_sheets, bare, peaks = side_by_side(
             lambda: _offsets(grid, samples, length),
             lambda: bridged_gaps(grid, samples, boundary, length),
@@ -108,14 +109,14 @@ class Judged:
             lambda: [] if rough else _beside(grid, samples, found, followed, members),
             lambda: cut_apart(grid, samples, found, length),
             lambda: nodes_off_sheets(grid, samples, length),
-            lambda: mostly_bare(grid, samples, found, length),
+            lambda: mostly_bare(grid, samples, feet, length),
             lambda: [] if rough else rounded_peaks(grid, samples, found, followed, members),
         )
         roughness = NOISES_OFF * offsets.get("node_scatter", 0.0) if rough else 0.0
         rounded = _rounded(found, followed, members, roughness)
         places = places_to_look_at(self.certificate, missed_at, rounded)
         closed = closed_holes(samples, boundary)
-        slits, narrow, parts = narrow_gaps(grid, samples, found, [*closed, *gaps], length)
+        slits, narrow, parts = narrow_gaps(grid, samples, feet, found, [*closed, *gaps], length)
         bridged = [each for each in bridged if each.kind == "bridged" or not each.is_said_by(parts)]
         holes = [*closed, *first_and_more([*(gap for gap in gaps if gap not in parts), *slits])]
         lids = openings_closed(holes, [*bridged, *narrow], samples, length, grid.unit)

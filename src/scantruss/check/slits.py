@@ -70,7 +70,12 @@ class FeetOnGrid:
 
 
 def narrow_gaps(
-    grid: Grid, samples: SurfaceSamples, found: Distances, known: Sequence[LeftOut], length: float
+    grid: Grid,
+    samples: SurfaceSamples,
+    feet: FeetOnGrid | None,
+    found: Distances,
+    known: Sequence[LeftOut],
+    length: float,
 ) -> tuple[list[LeftOut], list[Fault], list[LeftOut]]:
     """Return the narrow gaps that a grid bridges, the longest first, a warning of them, and what is known and a part of one.
 
@@ -79,10 +84,10 @@ def narrow_gaps(
 
     Parameters
     ----------
+    feet : the points on the grid; None where there are none
     known : holes and gaps that are said already
     length : desired member length [scan unit]
     """
-    feet = feet_on(grid, samples, found, length)
     if feet is None:
         return [], [], []
     members = np.full(len(grid.nodes), length) if grid.desired is None else grid.desired

@@ -44,6 +44,8 @@ def unfollowed_steps(
     height = ((points - grid.nodes[grid.triangles[triangle, 0]]) * normal).sum(axis=1)
     column = max(COLUMN[0] * samples.spacing, COLUMN[1] * member)
     least = max(STEP[0] * column, STEP[1] * member) + NOISES_OFF * float(np.median(found.noise))
+    if np.abs(height).max() <= 0.5 * least:  # then no column is as high
+        return []
     order, begin, end = _columns(points - height[:, None] * normal, height, column)
     spared = (end - begin >= SPARED_FROM).astype(np.int64)
     step = height[order[end - 1 - spared]] - height[order[begin + spared]]

@@ -13,13 +13,12 @@ from dataclasses import MISSING, Field, fields
 from pathlib import Path
 from typing import Any, NoReturn
 
-from ..errors import InputError
+from ..errors import InputError, decimal_comma_words
 from ..selection import Selection, read_crop
 from ..settings import CURVATURE, RECORDS, Settings
 from ..settings.values import SYMMETRIES_FOUND
 from .positions import position, read_planes, read_polylines, read_positions
 
-DECIMAL_COMMA = re.compile(r"[-+]?\d*,\d+")
 WITH_UNIT = re.compile(r"[-+]?\d*[.,]?\d+\s*([a-z]+|\"|')", re.IGNORECASE)  # a number with its unit
 
 
@@ -105,17 +104,13 @@ def number(text: str) -> float:
 
 def _why_no_number(text: str) -> str:
     """Say of a text that is nearly a number what is wrong with it, to follow "needs a number"."""
-    if DECIMAL_COMMA.fullmatch(text):
-        return _with_point(text)
+    if comma := decimal_comma_words(text):
+        return comma
     if text.endswith("%"):
         return f" without %, got {text}; one percent is 0.01"
     if found := WITH_UNIT.fullmatch(text):
         return f" without {found[1]}, got {text}; --help names its unit"
     return f", got {text!r}"
-
-
-def _with_point(text: str) -> str:
-    return f"; write {text.replace(',', '.')} with a point, not {text}"
 
 
 def numbers(text: str) -> tuple[float, ...]:
@@ -130,8 +125,8 @@ def length_or_field(text: str) -> float | str:
     if text.startswith(CURVATURE) or Path(text).is_file():
         return text
     needs = f"needs a number, a file of lengths or {CURVATURE}MIN:MAX"
-    if DECIMAL_COMMA.fullmatch(text):
-        raise argparse.ArgumentTypeError(f"{needs}{_with_point(text)}")
+    if comma := decimal_comma_words(text):
+        raise argparse.ArgumentTypeError(f"{needs}{comma}")
     if found := WITH_UNIT.fullmatch(text):
         raise argparse.ArgumentTypeError(
             f"{needs} in the unit of the scan, without {found[1]} (info prints the unit, --unit sets it);"

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import re
 from typing import TYPE_CHECKING, Any
 
-from ..errors import InputError
+from ..errors import InputError, decimal_comma_words
 from ..settings.records import EFFORTS, PREFER
 from .cells_tool import CellsTool, words_of_panels, words_of_planes
 from .feature_list import FeatureList
@@ -60,9 +59,8 @@ class DesignTab:
         try:
             length = float(self.length.value)
         except ValueError:
-            wish = self.length.value.replace(",", ".", 1)
-            comma = f"; write {wish} with a point" if re.fullmatch(r"\s*\d+\.\d+\s*", wish) else ""
-            raise InputError(f"length needs a number, got {self.length.value!r}{comma}") from None
+            text = self.length.value
+            raise InputError(f"length needs a number, got {text!r}{decimal_comma_words(text)}") from None
         self.view.session.set_length(length)
 
     def fill(self, before: StudioState | None, state: StudioState) -> None:

@@ -101,9 +101,7 @@ def _long_groups(found: Linked, rod: np.ndarray, known: np.ndarray, length: floa
 
     Others are corners of a sheet, or where it has few points.
     """
-    beside = found.neighbors
-    one, other = np.nonzero((beside >= 0) & rod[:, None] & rod[beside])
-    label = component_labels(len(rod), one, beside[one, other])
+    label = _groups_of(found, rod)
     order = np.argsort(label, kind="stable")
     first = np.flatnonzero(np.diff(label[order], prepend=-1))
     sizes = np.maximum.reduceat(found.mean[order], first) - np.minimum.reduceat(found.mean[order], first)
@@ -117,11 +115,16 @@ def _long_groups(found: Linked, rod: np.ndarray, known: np.ndarray, length: floa
     return marked
 
 
-def _behind_sheets(found: Linked, rod: np.ndarray, length: float) -> np.ndarray:
-    """Return which samples (S,) bool continue a straight rod along its axis: a column that goes on above its roof."""
+def _groups_of(found: Linked, rod: np.ndarray) -> np.ndarray:
+    """Return the number of each sample's group (S,): samples of rods that are linked are in one."""
     beside = found.neighbors
     one, other = np.nonzero((beside >= 0) & rod[:, None] & rod[beside])
-    label = component_labels(len(rod), one, beside[one, other])
+    return component_labels(len(rod), one, beside[one, other])
+
+
+def _behind_sheets(found: Linked, rod: np.ndarray, length: float) -> np.ndarray:
+    """Return which samples (S,) bool continue a straight rod along its axis: a column that goes on above its roof."""
+    label = _groups_of(found, rod)
     goes_on = np.zeros(len(rod), np.bool_)
     along_axes: list[np.ndarray] = []
     for group in np.unique(label[rod]):
@@ -142,9 +145,8 @@ def _behind_sheets(found: Linked, rod: np.ndarray, length: float) -> np.ndarray:
         spreads, off, count = _spreads(found, alive, COARSE_REACH * length)
         stands_off = (off > np.maximum(END_OFFSET * length, 2.0 * np.sqrt(spreads[:, 0]))) | (count < SAMPLES_OF_SHEET)
         for part in along_axes:
-            if (
-                off[part & (count >= SAMPLES_OF_SHEET)] > STUB * length
-            ).any():  # else it is the sheet where the rod ends
+            is_stub = off[part & (count >= SAMPLES_OF_SHEET)] > STUB * length
+            if is_stub.any():  # else it is the sheet where the rod ends
                 goes_on |= part & stands_off
     return goes_on
 
