@@ -5,6 +5,7 @@ Each test holds back what a loaded machine may hold back, at the worst moment.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
@@ -20,7 +21,7 @@ from scantruss.grid.grid import Grid
 from scantruss.layouts.on_scan import ScanOfGrid
 from scantruss.layouts.trade import COUNTS, traded_lengths
 from scantruss.runtime.progress import Progress
-from scantruss.studio import trade_steps
+from scantruss.studio import server, trade_steps
 from scantruss.studio.head import words_of_session
 from scantruss.studio.session import Session
 from scantruss.studio.worker import StoppedError, Worker
@@ -139,7 +140,15 @@ def test_what_was_typed_counts_for_a_press_before_its_pause_is_over(
         assert errors == []
 
 
-def test_what_the_server_writes_meanwhile_comes_between_no_characters(served: tuple[str, Session, Any]) -> None:
+def test_what_the_server_writes_meanwhile_comes_between_no_characters(
+    served: tuple[str, Session, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """However late what is written comes: no pause of typing is over, and none before the next character is too long."""
+    monkeypatch.setattr("scantruss.studio.typed_fields.TYPING_PAUSE", 2 * PATIENCE)
+    patient = [tmp_path / script.name for script in server.PAGE_SCRIPTS]
+    for script, copy in zip(server.PAGE_SCRIPTS, patient, strict=True):
+        copy.write_text(re.sub(r"TYPES_ON = \d+", f"TYPES_ON = {2000 * PATIENCE:.0f}", script.read_text()))
+    monkeypatch.setattr(server, "PAGE_SCRIPTS", tuple(patient))
     address, session, pages = served
     with open_page(address) as (page, errors):
         page.wait_for_selector("text=Generate")
@@ -148,15 +157,27 @@ def test_what_the_server_writes_meanwhile_comes_between_no_characters(served: tu
         length = field(page, "exactly")
         (_, view) = next(iter(pages._views.values()))
 
+        heard = list[str]()
+
+        async def hear(_: Any) -> None:
+            heard.append(view.design.length.value)
+
+        view.design.length.on_update(hear)
+
         def write(text: str) -> None:
             view.design.length.value = text
             view.client.flush()
             assert until(lambda: length.input_value() == text)
 
+        def until_heard(text: str) -> None:
+            """Wait for what was typed: viser does not send what was written before that comes."""
+            assert until(lambda: heard[-1:] == [text])
+
         length.select_text()
         page.evaluate("new Promise((seen) => requestAnimationFrame(() => setTimeout(seen)))")  # the page has seen it
         write("3.3")
         page.keyboard.insert_text("1")
+        until_heard("1")
         write("4.4")
         page.keyboard.type(".2")
         assert length.input_value() == "1.2"
@@ -165,6 +186,7 @@ def test_what_the_server_writes_meanwhile_comes_between_no_characters(served: tu
         assert length.input_value() == "12"
         page.keyboard.press("ControlOrMeta+a")
         page.evaluate("new Promise((seen) => requestAnimationFrame(() => setTimeout(seen)))")
+        until_heard("12")
         write("5.5")
         page.keyboard.type("1.7")
         assert length.input_value() == "1.7"
