@@ -163,6 +163,15 @@ def test_the_length_nearby_is_the_nearest_that_passes_and_costs_no_more_than_twe
     assert sum(max(1.0, cost / costs[0]) for cost in costs[1:]) <= 20.0 and len(set(made)) >= 4
 
 
+def test_from_the_usual_length_steps_lead_towards_one_that_is_far_away(monkeypatch: pytest.MonkeyPatch) -> None:
+    cloud = cloud_of("limpet")
+    usual, (_, high) = suggest_length(cloud), length_range(cloud)
+    asked = min(6.0 * usual, high)
+    assert asked > 4.2 * usual
+    counted_runs(monkeypatch, lambda length: length < 2.1 * usual)
+    assert Advice(cloud, st.Settings(length=1.0)).nearby(asked) == pytest.approx(1.96 * usual, rel=0.05)
+
+
 def points_of_run(cloud: st.PointCloud, length: float) -> float:
     """Return the time that a quick grid takes, as points of the scan: a member takes that of nine."""
     return len(cloud.points) + 9 * Advice(cloud, st.Settings(length=1.0)).members(length)

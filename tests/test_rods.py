@@ -192,6 +192,27 @@ def test_a_grid_over_a_scaffold_keeps_to_its_roof(scaffolded: tuple[np.ndarray, 
     assert np.abs(z - 6.0 + 0.03 * x * x + 0.04 * y * y).max() < 0.1
 
 
+@pytest.mark.parametrize("length", [1.6, 3.0, 4.5])
+@pytest.mark.parametrize("bend", [0.0, 0.02])
+def test_flat_arms_of_a_shell_are_no_rods_however_long_the_members(length: float, bend: float) -> None:
+    """A member is wider than the arms, as than the posts below: of these, scanned from one side, it sees a flat face too."""
+    rng = np.random.default_rng(7)
+    xy = rng.uniform(-12, 12, (60_000, 2))
+    on_disc = np.hypot(*xy.T) < 5.0
+    xy = xy[on_disc | (np.abs(xy).min(axis=1) < 0.6)]
+    shell = np.column_stack([xy, 6.0 - bend * (xy**2).sum(axis=1)])
+    faces = [
+        np.column_stack([rng.uniform(x - 0.3, x + 0.3, 400), np.full(400, y), rng.uniform(0.0, 6.0 - 18 * bend, 400)])
+        for x in (-3.0, 3.0)
+        for y in (-3.0, 3.0)
+    ]
+    points = np.concatenate([shell, *faces]) + rng.normal(0.0, 0.004, (len(shell) + 1600, 3))
+    samples = sample_surface(st.PointCloud.from_array(points), st.Settings(length=length, keep_rods=False))
+    rods = samples.judged == ROD
+    assert not rods[: len(shell)][np.hypot(*xy.T) > 5.0].any() and rods[: len(shell)].sum() < 10  # where posts end
+    assert rods[len(shell) :].mean() > 0.9
+
+
 def test_rods_are_looked_for_from_a_few_spacings_up_to_the_length_asked_for() -> None:
     assert lengths_of_rods(1.0, 0.05) == [1.0]
     lengths = lengths_of_rods(5.0, 0.05)

@@ -27,7 +27,8 @@ if TYPE_CHECKING:
     from ..scan.cloud import PointCloud
     from ..settings import Settings
 
-A_FEW, SOME_MORE = 4, 8  # grids that are made of a length before others are tried, and when it is tried again
+# grids that are made of a length before others are tried: where many are to be tried, usually, and when it is tried again
+FIRST_TWO, A_FEW, SOME_MORE = 2, 4, 8
 #: lengths to try in turn after the usual one, as multiples of it, with how many grids are made of each
 LONGER_FIRST = (
     (1.4, A_FEW), (2.0, A_FEW), (2.8, A_FEW), (1 / 1.4, A_FEW), (2.0, SOME_MORE), (1.4, SOME_MORE), (1.0, SOME_MORE),
@@ -299,19 +300,32 @@ class Advice:
         if (sure := round_length(SURE_PER_SPACING * self._cloud.spacing, "up")) > length and sure < high:
             lengths.add(sure)
         self._count_at(at, MOST_TRIED)
-        for most in (A_FEW, SOME_MORE):
+        for most in (FIRST_TWO, A_FEW, SOME_MORE):
             for each in sorted(lengths, key=lambda other: (abs(np.log(other / length)), other)):
                 trial = self.try_length(each, most=most)
                 if trial is not None and trial.passed:
                     return trial.length
         if not min(lengths, default=at) <= self._usual <= max(lengths, default=at):  # then this is cheap, or worth it
-            return self._usual_if_it_passes()
+            usual = self._usual_if_it_passes()
+            return None if usual is None else self._nearer(usual, at)
         return None
 
     def _usual_if_it_passes(self) -> float | None:
         self._count_at(self._usual, TRIED_USUAL)
         trial = self.try_length(self._usual, most=A_FEW)
         return trial.length if trial is not None and trial.passed else None
+
+    def _nearer(self, passing: float, length: float) -> float:
+        """Return the last of lengths that pass, in steps from one towards another, which is far away."""
+        self._count_at(passing, TRIED_AROUND)
+        while abs(math.log(length / passing)) > math.log(NEXT_LENGTH):  # ends: each turn is one step nearer
+            trial = self.try_length(
+                self.next_above(passing) if passing < length else self.next_below(passing), FIRST_TWO
+            )
+            if trial is None or not trial.passed:
+                break
+            passing = trial.length
+        return passing
 
     def next_above(self, length: float) -> float:
         """Return the next longer length to look at."""

@@ -28,6 +28,11 @@ TILT = 0.06  # by which that axis may be wrong, as it is taken from a part of a 
 FEWEST_OF_STRAIGHT = 12  # fewest samples of a rod whose axis is known
 WIDEST_ROD = 0.4  # half the width of what goes on, at most [member lengths]
 STUB = 0.4  # distance from the sheet that a rod behind it reaches at least [member lengths]
+JUNCTIONS_LOOKED_AT = 8  # places of a group of rods at which it may go on as a sheet, at most
+FLAT_ACROSS = 0.1  # largest variance across a strip, in that over its width; half a tube has 0.19
+PLACES_OF_STRIP = 16  # places of a strip at which it is looked at, at most
+FILLED_ACROSS = 0.3  # least variance across the points around a place of a strip, in that along it; of half a disc 0.28
+LEVEL_WITH_SHEET = 0.87  # cosine of the angle between the normals of a strip and of the sheet that it continues
 ROD_DISTANCE = 0.8  # distance from all sheets at which a rod stands at one place at least [member lengths]
 
 
@@ -65,6 +70,7 @@ def rod_points(found: Linked, points: int, length: float, supports: np.ndarray |
             break
         rod |= ends
     rod &= _long_groups(found, rod, known, length)
+    rod &= ~_arms(found, rod, length)
     rod |= _behind_sheets(found, rod, length)
     if rod.mean() > MOST_RODS:
         rod[:] = False
@@ -113,6 +119,43 @@ def _long_groups(found: Linked, rod: np.ndarray, known: np.ndarray, length: floa
     long[label[known]] = True
     marked: np.ndarray = long[label]
     return marked
+
+
+def _arms(found: Linked, rod: np.ndarray, length: float) -> np.ndarray:
+    """Return which samples (S,) bool are of arms of a sheet: narrow strips that are flat and level with it where they begin.
+
+    A column may look flat where a scanner sees one side of it, but it stands across its roof.
+    """
+    arm = np.zeros(len(rod), np.bool_)
+    if not rod.any():
+        return arm
+    label, beside = _groups_of(found, rod), found.neighbors
+    begins = np.flatnonzero(rod & ((beside >= 0) & ~rod[beside]).any(axis=1))
+    normals = np.linalg.eigh(_moments(found, ~rod, COARSE_REACH * length)[0])[1][:, :, 0]
+    for group in np.unique(label[begins]):
+        own = np.flatnonzero(rod & (label == group))
+        points = np.concatenate([found.grouped[found.start[one] : found.start[one + 1]] for one in own])
+        at = begins[label[begins] == group]
+        at = at[:: -(-len(at) // JUNCTIONS_LOOKED_AT)]
+        level = [_is_level(points, found.mean[one], COARSE_REACH * length, normals[one]) for one in at]
+        arm[own] = 2 * sum(level) > len(level)
+    return arm
+
+
+def _is_level(points: np.ndarray, place: np.ndarray, reach: float, normal: np.ndarray) -> bool:
+    """Whether points around a place form a flat strip of nearly this normal, filled between its edges as no frame of rods is."""
+    near = points[((points - place) ** 2).sum(axis=1) < reach**2]
+    if len(near) < SAMPLES_OF_SHEET:
+        return False
+    variances, axes = np.linalg.eigh(np.cov(near, rowvar=False))
+    if variances[0] > FLAT_ACROSS * variances[1] or abs(axes[:, 0] @ normal) < LEVEL_WITH_SHEET:
+        return False
+    some = near[:: -(-len(near) // PLACES_OF_STRIP)]
+    inside = ((points[None] - some[:, None]) ** 2).sum(axis=2) < 3.0 * variances[1]  # half of its width around each
+    around = [
+        np.linalg.eigvalsh(np.cov(points[each], rowvar=False)) for each in inside if each.sum() >= SAMPLES_OF_SHEET
+    ]
+    return 2 * sum(bool(each[1] > FILLED_ACROSS * each[2]) for each in around) > len(some)
 
 
 def _groups_of(found: Linked, rod: np.ndarray) -> np.ndarray:
