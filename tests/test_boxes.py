@@ -9,7 +9,7 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from typed import xyz
 
-from scantruss.kernels.geometry.boxes import SearchBoxes, box_index, new_boxes, put, search, take
+from scantruss.kernels.geometry.boxes import SearchBoxes, box_index, nearest, new_boxes, put, search, take
 
 pytestmark = pytest.mark.kernels
 
@@ -46,6 +46,26 @@ def test_boxes_find_exactly_what_brute_force_finds(points: np.ndarray, box: floa
     places += list(points[rng.integers(len(points), size=3)] + rng.normal(size=(3, 3)))
     for place in places:
         assert found_in(boxes, points, place, reach) == naive.within(points, place, reach)
+
+
+@given(clouds(), st.floats(0.05, 3.0), st.floats(0.0, 4.0), st.integers(0, 1000))
+def test_the_nearest_is_the_first_of_those_that_no_other_is_nearer_than(
+    points: np.ndarray, box: float, reach: float, seed: int
+) -> None:
+    """Of points that lie outside of the bounds of the boxes too, as those that were put in later."""
+    rng = np.random.default_rng(seed)
+    within = points[: max(len(points) // 2, 1)]
+    boxes = new_boxes(within.min(axis=0), within.max(axis=0), box, len(points), len(points))
+    for i, point in enumerate(points):
+        put(boxes, i, *point)
+    for place in [
+        points[0],
+        points.min(axis=0) - 0.7,
+        *(points[rng.integers(len(points), size=4)] + rng.normal(size=(4, 3))),
+    ]:
+        squares = ((points - place) ** 2).sum(axis=1)
+        first = int(squares.argmin())
+        assert nearest(boxes, points, *xyz(place), reach) == (first if squares[first] < reach * reach else -1)
 
 
 @given(clouds(), st.floats(0.05, 3.0), st.integers(0, 1000))

@@ -63,7 +63,7 @@ class FeetOnGrid:
             len(flat),
             PLACES_MEASURED_PER_THREAD,
             lambda _, begin, end: nearest_distances(
-                flat[begin:end], self.points, self.boxes, 2.0 * self.spacing, distance[begin:end]
+                flat[begin:end], self.points, self.boxes, 3.0 * self.spacing, distance[begin:end]
             ),
         )
         return distance.reshape(places.shape[:-1])
@@ -134,7 +134,7 @@ def feet_on(grid: Grid, samples: SurfaceSamples, found: Distances, length: float
     points, triangle = samples.scan[near], found.triangle[near]
     height = ((points - corner[triangle]) * normal[triangle]).sum(axis=1)
     points = np.ascontiguousarray(points - height[:, None] * normal[triangle])
-    return FeetOnGrid(points, boxes_of(points, max(0.1 * length, 2.0 * samples.spacing)), samples.spacing)
+    return FeetOnGrid(points, boxes_of(points, max(0.1 * length, 4.0 * samples.spacing)), samples.spacing)
 
 
 def normals_of(grid: Grid) -> np.ndarray:

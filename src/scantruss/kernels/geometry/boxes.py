@@ -12,6 +12,8 @@ import numpy as np
 
 from ...runtime.jit import kernel
 
+NEARLY_IN_BOX = 1e-6  # by which a place may be in the box beside its own [boxes]
+
 
 class SearchBoxes(NamedTuple):
     """Items (points, samples or nodes) by box."""
@@ -174,8 +176,30 @@ def nearest(boxes: SearchBoxes, positions: np.ndarray, x: float, y: float, z: fl
         for slot in range(len(boxes.first)):
             best, least = _nearest_in_box(boxes, slot, positions, x, y, z, best, least)
         return best
+    own = box_index(boxes, 0, x), box_index(boxes, 1, y), box_index(boxes, 2, z)
+    best, least = _nearest_in_box(boxes, slot_of(boxes, *own), positions, x, y, z, best, least)
     for i in range(box_index(boxes, 0, x - reach), box_index(boxes, 0, x + reach) + 1):
+        to_i = _squared_gap(boxes, 0, i, x)
+        if to_i > least:
+            continue
         for j in range(box_index(boxes, 1, y - reach), box_index(boxes, 1, y + reach) + 1):
+            to_j = to_i + _squared_gap(boxes, 1, j, y)
+            if to_j > least:
+                continue
             for k in range(box_index(boxes, 2, z - reach), box_index(boxes, 2, z + reach) + 1):
-                best, least = _nearest_in_box(boxes, slot_of(boxes, i, j, k), positions, x, y, z, best, least)
+                if to_j + _squared_gap(boxes, 2, k, z) <= least and (i, j, k) != own:
+                    best, least = _nearest_in_box(boxes, slot_of(boxes, i, j, k), positions, x, y, z, best, least)
     return best
+
+
+@kernel
+def _squared_gap(boxes: SearchBoxes, axis: int, index: int, x: float) -> float:
+    """Return the square of how far a coordinate is from a box along an axis, rounding aside; the outermost boxes have no end."""
+    low = (x - boxes.lower[axis]) * boxes.inverse[axis] - index
+    gap = 0.0
+    if low < 0.0 and index > 0:
+        gap = -low
+    elif low > 1.0 and index < boxes.counts[axis] - 1:
+        gap = low - 1.0
+    gap = max(gap - NEARLY_IN_BOX, 0.0) * boxes.size[axis]
+    return gap * gap
