@@ -99,6 +99,16 @@ def test_a_grid_that_covers_the_bays_of_a_plate_fails_and_one_with_a_small_bay_d
     assert any("covers nothing on" in fault.words for fault in found.faults) != passes
 
 
+def test_a_part_with_few_points_is_covered() -> None:
+    """A third of it has one point in twenty, two and a half spacings to a member."""
+    rng = np.random.default_rng(4)
+    points = rng.uniform(-9.0, 9.0, (50_000, 2))
+    points = points[((points < -1.0).any(axis=1)) | (rng.random(len(points)) < 0.05)]
+    points = np.column_stack([points, 0.3 * np.cos(0.2 * points[:, 0]) + 0.004 * rng.normal(size=len(points))])
+    grid = grid_from_points(points, st.Settings(length=1.0, effort="quick"))
+    assert known(grid.certificate).passed and known(grid.certificate).missing < 0.001
+
+
 @pytest.mark.parametrize(("height", "named"), [(0.5, True), (0.2, False)])
 def test_a_slender_peak_that_members_cut_off_is_named_with_its_place(height: float, named: bool) -> None:
     points = sheet(13, 8, 0.03, keep=lambda x, y: (abs(y) < 3.4) & (abs(x - y / 3**0.5) < 4.0))

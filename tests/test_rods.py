@@ -213,6 +213,20 @@ def test_flat_arms_of_a_shell_are_no_rods_however_long_the_members(length: float
     assert rods[len(shell) :].mean() > 0.9
 
 
+def test_what_is_nothing_but_rods_is_a_scan_nevertheless() -> None:
+    """A wing, a boom and a tail, all narrower than the members."""
+    rng = np.random.default_rng(3)
+    wing, tail = (
+        rng.uniform([x, -w, 0.0], [x + c, w, 0.0], (n, 3))
+        for x, w, c, n in ((0.0, 8.0, 1.5, 30_000), (6.5, 1.5, 0.7, 3000))
+    )
+    turn = rng.uniform(0.0, 2.0 * np.pi, 4000)
+    boom = np.column_stack([rng.uniform(1.5, 7.0, 4000), 0.12 * np.cos(turn), 0.12 * np.sin(turn)])
+    cloud = st.PointCloud.from_array(np.concatenate([wing, boom, tail]) + rng.normal(0.0, 0.003, (37_000, 3)))
+    samples = sample_surface(cloud, st.Settings(length=4.5, keep_rods=False))
+    assert (samples.judged == KEPT).mean() > 0.99
+
+
 def test_rods_are_looked_for_from_a_few_spacings_up_to_the_length_asked_for() -> None:
     assert lengths_of_rods(1.0, 0.05) == [1.0]
     lengths = lengths_of_rods(5.0, 0.05)

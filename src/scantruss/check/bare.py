@@ -18,6 +18,8 @@ ON_SIDE_FIRST, ON_SIDE = 3, 8  # places along a side of a triangle, at a first l
 # least distance of a bare place from all points [member lengths, spacings of the points, usual distances: between lines of a scanner
 # none is twice as far]
 BARE_FROM, SPACINGS_BARE, USUAL_DISTANCES = 0.2, 5.0, 3.0
+# ... and in a part with few points, which are this far from a place at random once in 500 times [root of the area of one], but at most:
+FEW_POINTS, FARTHEST_OF_FEW = 1.4, 0.5  # [member lengths]
 # share of a grid that may be bare: of 228 good ones, of shells, twins and real scans, none has more than 0.016; 0.095 where a grid
 # spans the bays of a star, 0.28 under a lid
 MOST_BARE = 0.05
@@ -60,9 +62,21 @@ def _bare_places(
     shares /= shares.sum(axis=1, keepdims=True)
     corners = grid.nodes[grid.triangles]
     members = np.full(len(grid.nodes), length) if grid.desired is None else grid.desired
-    least = np.maximum(BARE_FROM * members[grid.triangles].mean(axis=1), SPACINGS_BARE * samples.spacing)
+    members = members[grid.triangles].mean(axis=1)
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    few = np.minimum(FEW_POINTS * np.sqrt(_area_of_a_point(grid, feet, 0.5 * area)), FARTHEST_OF_FEW * members)
+    least = np.maximum(np.maximum(BARE_FROM * members, few), SPACINGS_BARE * samples.spacing)
     places = np.einsum("pc,tcx->tpx", shares, corners)
     away = feet.away(places)
     away -= np.maximum(least, USUAL_DISTANCES * float(np.median(away)))[:, None]
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     return places, away, area
+
+
+def _area_of_a_point(grid: Grid, feet: FeetOnGrid, area: np.ndarray) -> np.ndarray:
+    """Return the area of a grid for each point on it, around that corner of each triangle (T,) that has most; inf where there are none."""
+    at_corners, points = (
+        np.bincount(grid.triangles.ravel(), np.repeat(each, 3), len(grid.nodes)) for each in (area, feet.on_triangle)
+    )
+    each = np.divide(at_corners, points, out=np.full(len(points), np.inf), where=points > 0.0)
+    least: np.ndarray = each[grid.triangles].min(axis=1)
+    return least

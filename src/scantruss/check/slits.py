@@ -54,6 +54,7 @@ class FeetOnGrid:
     points: np.ndarray  #: (N, 3)
     boxes: SearchBoxes
     spacing: float
+    on_triangle: np.ndarray  #: (T,) int64, how many there are on each triangle
 
     def away(self, places: np.ndarray) -> np.ndarray:
         """Return the distance of each place (..., 3) from the nearest foot."""
@@ -134,7 +135,8 @@ def feet_on(grid: Grid, samples: SurfaceSamples, found: Distances, length: float
     points, triangle = samples.scan[near], found.triangle[near]
     height = ((points - corner[triangle]) * normal[triangle]).sum(axis=1)
     points = np.ascontiguousarray(points - height[:, None] * normal[triangle])
-    return FeetOnGrid(points, boxes_of(points, max(0.1 * length, 4.0 * samples.spacing)), samples.spacing)
+    boxes = boxes_of(points, max(0.1 * length, 4.0 * samples.spacing))
+    return FeetOnGrid(points, boxes, samples.spacing, np.bincount(triangle, minlength=len(grid.triangles)))
 
 
 def normals_of(grid: Grid) -> np.ndarray:

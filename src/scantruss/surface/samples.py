@@ -373,7 +373,7 @@ def _rods_of(points: np.ndarray, spacing: float, asked: Asked) -> np.ndarray:
         rods[left[_rods_at(length, found, len(left), asked)]] = True
     if len(lengths) > 1 and rods.any():
         rods |= pieces_of_rods(finest, rods, radii[0], asked.length)
-    return rods
+    return rods if not rods.all() else np.zeros(len(points), np.bool_)  # then they are the scan itself
 
 
 def _rods_at(length: float, found: Linked, points: int, asked: Asked) -> np.ndarray:
