@@ -9,6 +9,7 @@ from ..settings import UNITS
 from .clean_tool import CleanTool
 from .colours import CLASS_NAMES, MOST_CLASSES, OWN_COLORS, SCAN_COLOURINGS, colorings_of_scan
 from .crop_tool import CropTool
+from .left_out import words_left_out, words_on_page
 from .opening import EXAMPLES
 from .remove_tool import RemoveTool
 from .scan_parts import UP_AXES
@@ -35,7 +36,7 @@ class ScanTab:
             by_path = gui.add_button("Open the path")
             self.example = gui.add_dropdown("example", tuple(EXAMPLES))
             opened = gui.add_button("Open the example")
-        self.about = gui.add_markdown("")
+        self.about, self.left_out = gui.add_markdown(""), gui.add_markdown("", visible=False)
         self.unit = gui.add_dropdown("unit", tuple(name or UNKNOWN_UNIT for name in UNITS), initial_value=UNKNOWN_UNIT)
         self.up = gui.add_dropdown(
             "up",
@@ -77,6 +78,9 @@ class ScanTab:
             of_all = f" of {whole:,}" if whole != len(cloud.points) else ""
             self.about.content = f"**{cloud.name or 'scan'}**: {len(cloud.points):,}{of_all} points, {cloud.extent:.4g}{unit} long{saved}"
             self.unit.value = cloud.unit or UNKNOWN_UNIT
+        if before is None or before.cloud is not cloud or before.grid is not state.grid:
+            lines = words_left_out(state)
+            self.left_out.content, self.left_out.visible = words_on_page(lines), bool(lines)
         self.up.value = "z" if state.whole is None else state.whole.up
         if before is None or before.whole is not state.whole or before.settings.classes != state.settings.classes:
             self._fill_classes(state)
