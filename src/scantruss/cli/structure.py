@@ -112,7 +112,7 @@ def structure(values: Namespace) -> None:
     if plot is not None:
         claim(plot, "picture", taken, force=values.force)
     from ..grid.certificate import check_passed
-    from ..structure.doubts import support_words
+    from ..structure.doubts import doubts_of_settings, support_words
     from ..structure.modes import vibration_modes, worst_buckling
     from ..structure.path_report import encode_path, path_expectation
     from ..structure.report import report_structure
@@ -154,7 +154,7 @@ def structure(values: Namespace) -> None:
         found: dict[str, Any] = {
             "buckling": buckling, "vibration": vibration, "path": path, "rounds": rounds, "weights": weights
         }  # fmt: skip
-        report = report_structure(solution, settings.checks, _notes(settings), **found)
+        report = report_structure(solution, settings.checks, doubts_of_settings(settings), **found)
         bars("report", 0.0)
         models = [out for out in outs if out.suffix.lower() not in REPORT_SUFFIXES]
         written = write_models(model_of(solution, report=report), models, save, bars)
@@ -280,14 +280,3 @@ def _nodes_near(grid: Grid, path: str) -> np.ndarray:
             raise InputError(f"{path}: no node lies within half a member, {reach:.3g} {grid.unit}, of {words}")
         found.append(int(distance.argmin()))
     return np.unique(found)
-
-
-def _notes(settings: StructureSettings) -> list[str]:
-    """Return warnings of what was taken for granted."""
-    from ..structure.options import units_taken
-
-    words = [str(load.get("load", "")) if isinstance(load, dict) else str(load) for load in settings.loads]
-    notes = units_taken(settings.loads)
-    if any(word.startswith("wind:") and ":" not in word[5:] for word in words):
-        notes += ["wind without a coefficient presses with 1.0 everywhere; give one, as in wind:0.8kN/m2:-0.7"]
-    return notes

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from .options import StructureSettings, units_taken
 from .truss import Truss
 
 #: share of the surface that faces one way on the mean; ratio of its parts along x or y and along z: it may lie on its side
@@ -45,6 +46,15 @@ def doubts_of(truss: Truss) -> list[str]:
             f"the combinations that were given have none of {missing}; those of EN 1990 are not added to them"
         )
     return warnings
+
+
+def doubts_of_settings(settings: StructureSettings) -> list[str]:
+    """Return warnings of what was taken for granted."""
+    words = [str(load.get("load", "")) if isinstance(load, dict) else str(load) for load in settings.loads]
+    notes = units_taken(settings.loads)
+    if any(word.startswith("wind:") and ":" not in word[5:] for word in words):
+        notes += ["wind without a coefficient presses with 1.0 everywhere; give one, as in wind:0.8kN/m2:-0.7"]
+    return notes
 
 
 def _sideways(truss: Truss) -> list[str]:
