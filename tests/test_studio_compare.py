@@ -12,8 +12,8 @@ from scantruss.studio.view import StudioView
 
 
 def titles(view: StudioView) -> list[str]:
-    """Return the titles of the legends that are seen."""
-    return [each.title for each in view.legends.shown]
+    """Return the titles of the legends of members that are seen."""
+    return [each.title for each in view.legends.shown if each.title != "loads"]
 
 
 def colors(view: StudioView, part: str) -> np.ndarray:
@@ -40,7 +40,7 @@ def test_a_kept_design_is_coloured_by_what_the_present_one_is(tmp_path: Path) ->
         assert scale is not None and titles(view) == ["utilization"] and not view.compare.lack.visible
         present, kept = scale.of_designs
         assert kept.max() > present.max()
-        assert view.legends.shown[0].ends == scale.shown_ends and scale.ends == (present.min(), kept.max())
+        assert view.legends.shown[-1].ends == scale.shown_ends and scale.ends == (present.min(), kept.max())
         for part, values in (("/grid/members", present), ("/beside/members", kept)):
             assert np.array_equal(colors(view, part)[:, 0], to_be_seen(scale.colors(values)))
 
