@@ -15,14 +15,17 @@ from small_grids import cloud_over, dome, fan, icosahedron, make_grid, two_piece
 from typed import known, xyz
 
 import scantruss as st
-from scantruss.export.drawing.camera import choose_camera, facing_of, likely_upward, map_depth
+from scantruss.export.drawing.camera import choose_camera, map_depth
 from scantruss.export.drawing.left_out import AMBER, RED, VIOLET, shown_points
 from scantruss.export.drawing.legend import FAULT, marks_of, round_bar, scale_bar
-from scantruss.export.drawing.picture import PANELS_SIZE, PICTURE_SIZE, draw_panels, encode_picture, known_upward
+from scantruss.export.drawing.picture import PANELS_SIZE, PICTURE_SIZE, draw_panels, encode_picture
 from scantruss.export.drawing.strokes import FIXED_NODE_COLOUR, PAPER
 from scantruss.export.drawing.style import PictureStyle
 from scantruss.export.solid import build_solid
 from scantruss.grid.certificate import Certificate, Fault
+from scantruss.grid.upward import facing_of, guessed_up, known_upward, likely_upward, picture_notes
+from scantruss.structure.doubts import doubts_of_settings
+from scantruss.structure.options import StructureSettings
 
 
 def pixels(data: bytes) -> np.ndarray:
@@ -223,6 +226,17 @@ def test_gravity_is_z_where_the_unit_or_the_file_tells() -> None:
     assert np.array_equal(known(known_upward(grid.replace(unit="m"), None)), [0, 0, 1])
     tile = st.PointCloud.from_array(grid.nodes, name="tile.laz")
     assert np.array_equal(known(known_upward(grid, tile)), [0, 0, 1])
+
+
+@pytest.mark.parametrize(("unit", "long", "up"), [("", 2, ""), ("", 1, "y"), ("mm", 0, "x"), ("m", 1, "")])
+def test_pictures_of_a_grid_and_doubts_of_its_structure_agree_on_what_is_up(unit: str, long: int, up: str) -> None:
+    """A body that stands along an axis of its file: where that is not z, its picture stands, its structure lies, and both say so."""
+    body = icosahedron(unit=unit)
+    body = body.replace(nodes=body.nodes * np.where(np.arange(3) == long, 2.0, 1.0))
+    assert guessed_up(body) == up
+    words = picture_notes(body) + doubts_of_settings(StructureSettings(), body)
+    assert len(words) == 2 * bool(up) and all(f"{up} up" in each for each in words)
+    assert doubts_of_settings(StructureSettings(), dome(unit="")) == []
 
 
 @pytest.mark.parametrize("longest", [0.034, 0.99, 1.0, 3.7, 5.0, 780.0])

@@ -154,7 +154,7 @@ def structure(values: Namespace) -> None:
         found: dict[str, Any] = {
             "buckling": buckling, "vibration": vibration, "path": path, "rounds": rounds, "weights": weights
         }  # fmt: skip
-        report = report_structure(solution, settings.checks, doubts_of_settings(settings), **found)
+        report = report_structure(solution, settings.checks, doubts_of_settings(settings, grid), **found)
         bars("report", 0.0)
         models = [out for out in outs if out.suffix.lower() not in REPORT_SUFFIXES]
         written = write_models(model_of(solution, report=report), models, save, bars)

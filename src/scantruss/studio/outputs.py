@@ -8,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ..errors import InputError
-from ..export.formats import STRUCTURE, check_output, check_unit, losses, model_of, suffixes_of, write
+from ..export.formats import STRUCTURE, check_output, check_unit, losses, model_of, shown_otherwise, suffixes_of, write
 from ..export.model import Model
 from ..runtime.files import temporary_folder
 from ..scan.formats.writing import write_points
@@ -67,7 +67,7 @@ def files_of(state: StudioState, kind: str, suffix: str, note: Note = unsaid) ->
         path = check_output(folder / f"{kind}{suffix}", kind)
         check_unit(path, model.unit)
         files = {file.name: file.read_bytes() for file in write(model, path)}
-    for words in losses(model, path):
+    for words in (*losses(model, path), *shown_otherwise(model, path)):
         note(words)
     return files
 

@@ -73,7 +73,7 @@ def solved_state(state: StudioState, progress: Progress = _silent) -> StudioStat
     report = report_structure(
         solution,
         asked.checks,
-        doubts_of_settings(asked),
+        doubts_of_settings(asked, state.grid),
         buckling=buckling,
         vibration=vibration,
         rounds=rounds,
