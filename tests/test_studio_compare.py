@@ -7,6 +7,7 @@ from studio_dome import done, session_of_dome
 from studio_view import choose, view_of
 
 from scantruss.studio.session import Session
+from scantruss.studio.state import NO_GRID
 from scantruss.studio.tone import to_be_seen
 from scantruss.studio.view import StudioView
 
@@ -63,3 +64,15 @@ def test_a_kept_design_is_coloured_by_what_the_present_one_is(tmp_path: Path) ->
     with view_of(again) as view:
         choose(view, view.compare.other, "light")  # solved again
         assert view.look.scale is not None and np.allclose(view.look.scale.of_designs[1], kept)
+
+
+def test_a_grid_that_comes_after_none_is_coloured(tmp_path: Path) -> None:
+    session = session_of_dome(tmp_path, 6.0)
+    with view_of(session) as view:
+        assert view.look.coloring.value == "member length" and "data-field" in view.look.bars.content
+        choose(view, view.look.coloring, "members at a node")
+        session.change("none", **NO_GRID)
+        session.tell()
+        assert view.look.coloring.value == "plain" and view.look.bars.content == ""
+        session.undo()
+        assert view.look.coloring.value == "members at a node" and titles(view) == ["members at a node"]

@@ -97,12 +97,13 @@ class GridTab:
         """Offer the colourings that all that is drawn has, and take the one that was wanted, where it is among them."""
         present, other = self.present, self.view.compare.drawn
         of_present = choices_of([present] if present is not None else [])
-        self._wanted = self._wanted if self._wanted in (*of_present, PLAIN_GRID) else next(iter(of_present), PLAIN_GRID)
+        if present is not None and self._wanted not in (*of_present, PLAIN_GRID):
+            self._wanted = next(iter(of_present), PLAIN_GRID)
         both = [each for each in (present, other) if each is not None]
         self._choices = of_present if present is None or other is None else choices_of(both)
         self.coloring.options = (PLAIN_GRID, *self._choices)
-        is_there = self._wanted in self._choices or self._wanted == PLAIN_GRID
-        self.coloring.value = self._wanted if is_there else BY_LENGTH
+        is_there = present is None or self._wanted in self._choices or self._wanted == PLAIN_GRID
+        self.coloring.value = PLAIN_GRID if present is None else self._wanted if is_there else BY_LENGTH
         self.view.compare.say_lack("" if is_there else self._wanted)
         self._show_choice()
 
