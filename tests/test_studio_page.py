@@ -274,6 +274,9 @@ def test_a_person_makes_a_grid_and_a_structure(served: tuple[str, Session, Any],
         page.mouse.click(410, 370)
         page.wait_for_selector("text=/(node|member|panel) [NMP]\\d+/")
         tab(page, "Structure")
+        field(page, "supports").hover()
+        hint = page.wait_for_selector("[role=tooltip]").bounding_box()  # beside the panel: it covers no control
+        assert hint["x"] + hint["width"] <= page.locator(".studio-head").bounding_box()["x"]
         field(page, "section").fill("none such")
         page.click("button:has-text('Run')")
         page.wait_for_selector(
