@@ -385,6 +385,19 @@ def test_a_server_that_is_killed_loses_nothing_but_what_it_was_at(killable: Serv
         page.wait_for_selector("[role=status]:has-text('ready')")
 
 
+def test_the_time_of_what_runs_goes_on_while_the_server_says_nothing(served: tuple[str, Session, Any]) -> None:
+    address, session, _ = served
+    with open_page(address) as (page, errors):
+        page.wait_for_selector("text=Generate")
+        assert session.worker.wait(PATIENCE)
+        session.worker._progress("optimize", 0.5)  # the last that is heard
+        page.wait_for_selector("[role=status]:has-text('optimize 2 s')")
+        page.wait_for_selector("[role=status]:has-text('optimize 3 s')")
+        session.worker._tell(None)
+        page.wait_for_selector("[role=status]:has-text('ready')")
+        assert errors == []
+
+
 def test_a_click_on_what_is_said_on_the_drawing_reaches_the_drawing(served: tuple[str, Session, Any]) -> None:
     address, session, pages = served
     with open_page(address) as (page, errors):
