@@ -19,6 +19,7 @@ from scantruss.export.drawing.camera import choose_camera, map_depth
 from scantruss.export.drawing.left_out import AMBER, RED, VIOLET, shown_points
 from scantruss.export.drawing.legend import FAULT, marks_of, round_bar, scale_bar
 from scantruss.export.drawing.picture import PANELS_SIZE, PICTURE_SIZE, draw_panels, encode_picture
+from scantruss.export.drawing.sheet import PICTURE, encode_sheet
 from scantruss.export.drawing.strokes import FIXED_NODE_COLOUR, PAPER
 from scantruss.export.drawing.style import PictureStyle
 from scantruss.export.solid import build_solid
@@ -328,3 +329,16 @@ def test_more_places_of_a_fault_are_small_rings_of_its_colour() -> None:
     assert counts[1] > counts[0] + 30
     again = Certificate.from_dict(json.loads(json.dumps(known(marked.certificate).to_dict())))
     assert again.faults == known(marked.certificate).faults
+
+
+def test_a_sheet_shows_all_of_each_picture() -> None:
+    """Its title lies above it, its scale and caption are not cut off."""
+    image, stream = np.full((1200, 1600, 3), 255, np.uint8), io.BytesIO()
+    image[:20] = image[-20:] = image[:, :20] = image[:, -20:] = (255, 0, 0)
+    Image.fromarray(image).save(stream, "PNG")
+    sheet = np.asarray(Image.open(io.BytesIO(encode_sheet([("one", stream.getvalue())] * 3))).convert("RGB"), int)
+    red = (np.abs(sheet - [255, 0, 0]) < 60).all(axis=2)
+    wide, high = PICTURE
+    for left in range(0, 3 * wide, wide):
+        framed = red[-high:, left : left + wide]
+        assert framed[[3, -4]].all() and framed[:, [3, -4]].all()
