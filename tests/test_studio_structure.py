@@ -195,3 +195,7 @@ def test_every_loaded_node_has_an_arrow_or_the_legend_says_how_many_have(
         assert count == 7 and said.endswith(f"on 7 of {number} loaded nodes, evenly spread")
         choose(view, view.structure.loads, False)
         assert arrows() == (0, [])
+        assert (
+            "the weight of the nodes, as of balls, is not counted; the schedules in Out say"
+            in view.structure.results.content
+        )

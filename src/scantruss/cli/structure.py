@@ -120,6 +120,7 @@ def structure(values: Namespace) -> None:
         STRUCTURE_HEAD,
         half_lines,
         mode_lines,
+        node_lines,
         sizing_lines,
         structure_lines,
         unlisted_lines,
@@ -180,6 +181,7 @@ def structure(values: Namespace) -> None:
             *half_lines(report),
             f"{len(truss.nodes):,} nodes, {len(truss.members):,} members of {names} {truss.material.name},"
             f" {truss.lengths.mean():.3g} m long on average, {truss.mass:,.0f} kg without nodes",
+            *node_lines(truss),
             support_words(truss),
             *sizing_lines(report),
             *mode_lines(report),

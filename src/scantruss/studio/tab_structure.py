@@ -13,7 +13,7 @@ from ..errors import InputError, words_of_number
 from ..structure.build import scale_of
 from ..structure.groups import WAYS_TO_GROUP
 from ..structure.options import loads_of_words
-from ..structure.report_lines import sizing_lines
+from ..structure.report_lines import node_lines, sizing_lines
 from ..structure.supports import HELD
 from .colours import colors_of, legend_of
 from .compare import structure_figures
@@ -261,6 +261,7 @@ class StructureTab:
         rows = [f"**before the last change**, {words_of_asked(state)}:"] if state.is_structure_stale else []
         rows += [f"{name} **{value}**" for name, value in structure_figures(state)]
         if state.report is not None:
+            rows += [in_words_of_page(words) for words in node_lines(state.report.truss)]
             rows += sizing_lines(state.report)
             rows += [f"**warning:** {in_words_of_page(words)}" for words in state.report.warnings]
         self.results.content = "\n\n".join(rows)
