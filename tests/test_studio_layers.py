@@ -77,9 +77,10 @@ def test_a_double_layer_is_that_of_the_command_line_and_kept(tmp_path: Path, mon
 def test_all_layers_are_printed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     session, printed = layered(tmp_path), list[Any]()
 
-    def keep(grid: Any, place: Path, *, scale: float, **_: Any) -> None:
+    def keep(grid: Any, place: Path, *, scale: float, **_: Any) -> Any:
         printed.append((grid, scale))
         place.write_bytes(b"")
+        return SimpleNamespace(notes=())
 
     monkeypatch.setattr("scantruss.export.printed.apart.print_apart", keep)
     further_files(session.state, PRINTED, 120.0)
