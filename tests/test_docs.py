@@ -7,9 +7,12 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from marks import compiled_only
 
+import scantruss as st
 from scantruss.cli.commands import COMMANDS
 from scantruss.grid.certificate import KINDS_LEFT_OUT
+from scantruss.pipeline import grid_from_cloud
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
 SOURCE = DOCS.parent / "src" / "scantruss"
@@ -119,3 +122,14 @@ def test_every_line_of_a_result_is_explained() -> None:
         "wrote",
     ]
     assert [name for name in names if name.lower() not in page] == []
+
+
+@compiled_only
+def test_the_readme_says_how_much_the_members_of_its_examples_vary() -> None:
+    text = (DOCS.parent / "README.md").read_text(encoding="utf-8")
+    cloud = st.read_points(SOURCE / "data" / "shell.ply")
+    varies = {
+        length: 100.0 * grid_from_cloud(cloud, st.Settings(length=length)).quality.length_cv for length in (0.8, 1.5)
+    }
+    said = f"{varies[0.8]:.1f} to {varies[1.5]:.1f} %"
+    assert text.count(said) == 2 and said in (DOCS / "index.md").read_text(encoding="utf-8"), said

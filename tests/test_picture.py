@@ -15,14 +15,18 @@ from small_grids import cloud_over, dome, fan, icosahedron, make_grid, two_piece
 from typed import known, xyz
 
 import scantruss as st
-from scantruss.export.drawing.camera import choose_camera, facing_of, likely_upward, map_depth
+from scantruss.export.drawing.camera import choose_camera, map_depth
 from scantruss.export.drawing.left_out import AMBER, RED, VIOLET, shown_points
 from scantruss.export.drawing.legend import FAULT, marks_of, round_bar, scale_bar
-from scantruss.export.drawing.picture import PANELS_SIZE, PICTURE_SIZE, draw_panels, encode_picture, known_upward
+from scantruss.export.drawing.picture import PANELS_SIZE, PICTURE_SIZE, draw_panels, encode_picture
+from scantruss.export.drawing.sheet import PICTURE, encode_sheet
 from scantruss.export.drawing.strokes import FIXED_NODE_COLOUR, PAPER
 from scantruss.export.drawing.style import PictureStyle
 from scantruss.export.solid import build_solid
 from scantruss.grid.certificate import Certificate, Fault
+from scantruss.grid.upward import facing_of, guessed_up, known_upward, likely_upward, picture_notes
+from scantruss.structure.doubts import doubts_of_settings
+from scantruss.structure.options import StructureSettings
 
 
 def pixels(data: bytes) -> np.ndarray:
@@ -225,6 +229,17 @@ def test_gravity_is_z_where_the_unit_or_the_file_tells() -> None:
     assert np.array_equal(known(known_upward(grid, tile)), [0, 0, 1])
 
 
+@pytest.mark.parametrize(("unit", "long", "up"), [("", 2, ""), ("", 1, "y"), ("mm", 0, "x"), ("m", 1, "")])
+def test_pictures_of_a_grid_and_doubts_of_its_structure_agree_on_what_is_up(unit: str, long: int, up: str) -> None:
+    """A body that stands along an axis of its file: where that is not z, its picture stands, its structure lies, and both say so."""
+    body = icosahedron(unit=unit)
+    body = body.replace(nodes=body.nodes * np.where(np.arange(3) == long, 2.0, 1.0))
+    assert guessed_up(body) == up
+    words = picture_notes(body) + doubts_of_settings(StructureSettings(), body)
+    assert len(words) == 2 * bool(up) and all(f"{up} up" in each for each in words)
+    assert doubts_of_settings(StructureSettings(), dome(unit="")) == []
+
+
 @pytest.mark.parametrize("longest", [0.034, 0.99, 1.0, 3.7, 5.0, 780.0])
 def test_a_scale_bar_is_round_and_as_long_as_it_says(longest: float) -> None:
     bar = round_bar(longest)
@@ -314,3 +329,16 @@ def test_more_places_of_a_fault_are_small_rings_of_its_colour() -> None:
     assert counts[1] > counts[0] + 30
     again = Certificate.from_dict(json.loads(json.dumps(known(marked.certificate).to_dict())))
     assert again.faults == known(marked.certificate).faults
+
+
+def test_a_sheet_shows_all_of_each_picture() -> None:
+    """Its title lies above it, its scale and caption are not cut off."""
+    image, stream = np.full((1200, 1600, 3), 255, np.uint8), io.BytesIO()
+    image[:20] = image[-20:] = image[:, :20] = image[:, -20:] = (255, 0, 0)
+    Image.fromarray(image).save(stream, "PNG")
+    sheet = np.asarray(Image.open(io.BytesIO(encode_sheet([("one", stream.getvalue())] * 3))).convert("RGB"), int)
+    red = (np.abs(sheet - [255, 0, 0]) < 60).all(axis=2)
+    wide, high = PICTURE
+    for left in range(0, 3 * wide, wide):
+        framed = red[-high:, left : left + wide]
+        assert framed[[3, -4]].all() and framed[:, [3, -4]].all()

@@ -13,11 +13,11 @@ from test_layouts_of_quads import grid_of, honeycomb, vault
 from test_schedules import TUBE
 
 import scantruss as st
-from scantruss.cli.schedule import schedule_lines
 from scantruss.export.json import encode_json
 from scantruss.export.model import model_of_grid
 from scantruss.export.page_tables import tables_of
 from scantruss.layouts.alike import PartKinds
+from scantruss.schedules.lines import schedule_lines
 from scantruss.structure.json import encode_structure
 
 

@@ -12,9 +12,9 @@ from test_schedules import numbers
 
 import scantruss as st
 from scantruss.cli.main import main
-from scantruss.cli.schedule import warning_lines
 from scantruss.schedules.bolts import PITCHES, bolted_radii, choose_bolts, stress_area, tension_resistance
 from scantruss.schedules.forces import grid_of_structure
+from scantruss.schedules.lines import warning_lines
 from scantruss.structure.json import read_checked
 from scantruss.structure.truss import LoadCase
 

@@ -51,6 +51,23 @@ def test_the_report_holds_what_it_promises(place: Path, capsys: pytest.CaptureFi
     assert "wrote out.json report.json" in said and "snow" in said
 
 
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("--loads self,snow:1kN/m2", "the weight of the nodes, as of balls, is not counted"),
+        ("--loads self --node-allowance 15%", "15 % of "),
+        ("--loads snow:1kN/m2", ""),
+    ],
+)
+def test_it_is_said_whether_nodes_weigh_anything(
+    words: str, said: str, place: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(f"structure grid.json out.html --scale 50 {words}") == 0
+    lines = [line for line in capsys.readouterr().out.splitlines() if line.startswith("the weight of the nodes")]
+    assert len(lines) == bool(said) and all(said in line for line in lines)
+    assert said in Path("out.html").read_text()
+
+
 def test_buckling_and_frequencies_come_where_they_are_asked_for(
     place: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -15,7 +15,7 @@ from scantruss.grid.marks import node_marks
 from scantruss.layouts.double_layer import BOTTOM, TOP, WEB
 from scantruss.layouts.framework import Framework
 from scantruss.structure.options import StructureSettings
-from scantruss.studio.compare import drawn_members, structure_figures
+from scantruss.studio.compare import drawn_design, structure_figures
 from scantruss.studio.further_files import PRINTED, further_files
 from scantruss.studio.layers_tool import AS_USUAL, LayersTool, words_of_depths
 from scantruss.studio.outputs import settings_files
@@ -59,8 +59,8 @@ def test_a_double_layer_is_that_of_the_command_line_and_kept(tmp_path: Path, mon
     assert again.state.structure_settings.double_layer == DEPTH and again.solution is not None
     assert again.files("structure", ".json")["structure.json"] == ours
     for kept in (session.state.designs[0], again.state.designs[0]):  # drawn with all its layers
-        nodes, members = drawn_members(kept)
-        assert np.allclose(nodes, truss.nodes + truss.origin) and np.array_equal(members, truss.members)
+        model = drawn_design(kept).model
+        assert np.allclose(model.nodes, truss.nodes + truss.origin) and np.array_equal(model.members, truss.members)
     session.undo()
     session.undo()
     taken_back = session.state
@@ -77,9 +77,10 @@ def test_a_double_layer_is_that_of_the_command_line_and_kept(tmp_path: Path, mon
 def test_all_layers_are_printed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     session, printed = layered(tmp_path), list[Any]()
 
-    def keep(grid: Any, place: Path, *, scale: float, **_: Any) -> None:
+    def keep(grid: Any, place: Path, *, scale: float, **_: Any) -> Any:
         printed.append((grid, scale))
         place.write_bytes(b"")
+        return SimpleNamespace(notes=())
 
     monkeypatch.setattr("scantruss.export.printed.apart.print_apart", keep)
     further_files(session.state, PRINTED, 120.0)

@@ -274,6 +274,9 @@ def test_a_person_makes_a_grid_and_a_structure(served: tuple[str, Session, Any],
         page.mouse.click(410, 370)
         page.wait_for_selector("text=/(node|member|panel) [NMP]\\d+/")
         tab(page, "Structure")
+        field(page, "supports").hover()
+        hint = page.wait_for_selector("[role=tooltip]").bounding_box()  # beside the panel: it covers no control
+        assert hint["x"] + hint["width"] <= page.locator(".studio-head").bounding_box()["x"]
         field(page, "section").fill("none such")
         page.click("button:has-text('Run')")
         page.wait_for_selector(
@@ -380,6 +383,19 @@ def test_a_server_that_is_killed_loses_nothing_but_what_it_was_at(killable: Serv
         page.click("button:has-text('Run')")
         page.wait_for_selector("text=undo: run")
         page.wait_for_selector("[role=status]:has-text('ready')")
+
+
+def test_the_time_of_what_runs_goes_on_while_the_server_says_nothing(served: tuple[str, Session, Any]) -> None:
+    address, session, _ = served
+    with open_page(address) as (page, errors):
+        page.wait_for_selector("text=Generate")
+        assert session.worker.wait(PATIENCE)
+        session.worker._progress("optimize", 0.5)  # the last that is heard
+        page.wait_for_selector("[role=status]:has-text('optimize 2 s')")
+        page.wait_for_selector("[role=status]:has-text('optimize 3 s')")
+        session.worker._tell(None)
+        page.wait_for_selector("[role=status]:has-text('ready')")
+        assert errors == []
 
 
 def test_a_click_on_what_is_said_on_the_drawing_reaches_the_drawing(served: tuple[str, Session, Any]) -> None:

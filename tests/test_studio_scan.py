@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from studio_view import view_of
 
 import scantruss as st
 from scantruss.cli.main import main
@@ -189,3 +190,24 @@ def test_the_camera_stays_where_points_go_and_sees_all_of_another_crop(las: Path
     session.crop(("box:450001,5300001,450008,5300008",))
     StudioView._look_again(view, second, session.state)
     assert seen == ["all"]
+
+
+def test_a_scan_that_stands_on_another_axis_is_told_to_be_turned(tmp_path: Path) -> None:
+    turn, high = (
+        each.ravel() for each in np.meshgrid(np.linspace(0, 2 * np.pi, 60, endpoint=False), np.linspace(0, np.pi, 60))
+    )
+    points = np.stack([np.sin(high) * np.cos(turn), 2.0 * np.cos(high), np.sin(high) * np.sin(turn)], axis=1)
+    np.savetxt(tmp_path / "egg.xyz", points)
+    session = Session()
+    session.open(tmp_path / "egg.xyz")
+    session.set("length", length=0.6)
+    assert session.worker.wait(PATIENCE) and session.grid is not None
+    with view_of(session) as view:
+        assert view.scan.seems.visible and "**y** is up" in view.scan.seems.content
+        session.turn("y")
+        session.set("length", length=0.6)
+        assert session.worker.wait(PATIENCE) and session.grid is not None
+        assert not view.scan.seems.visible
+        session.turn("x")
+        session.set("length", length=0.6)
+        assert session.worker.wait(PATIENCE) and "**y** is up" in view.scan.seems.content  # the axis of the file

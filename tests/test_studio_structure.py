@@ -9,6 +9,7 @@ import openpyxl
 import pytest
 import trimesh
 from studio_dome import done, session_of_dome
+from studio_view import choose, view_of
 
 import scantruss as st
 from scantruss.cli.main import main
@@ -168,3 +169,33 @@ def test_the_end_of_a_front_is_what_is_seen_until_the_grid_is_made(
     done(session)
     assert session.grid is not None and session.front is None
     assert len(shown) > 3 and all(shown)
+
+
+def test_every_loaded_node_has_an_arrow_or_the_legend_says_how_many_have(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    session = session_of_dome(tmp_path, 6.0)
+    session.set_structure(section="CHS114.3x5", loads="self,snow:1kN/m2", frequencies=0)
+    session.run_structure()
+    done(session)
+    assert session.grid is not None
+    number = len(session.grid.nodes)
+    with view_of(session) as view:
+
+        def arrows() -> tuple[int, list[str]]:
+            handle = view.scene.api.get_handle_by_name("/loads")
+            words = [said for each in view.legends.shown if each.title == "loads" for _, said in each.marks]
+            return 0 if handle is None else len(handle.points) // 5, words
+
+        count, (said,) = arrows()
+        assert count == number and said.startswith("snow, at most ") and said.endswith(f"on all {number} loaded nodes")
+        monkeypatch.setattr("scantruss.studio.tab_structure.MOST_ARROWS", 7)
+        view.structure.draw()
+        count, (said,) = arrows()
+        assert count == 7 and said.endswith(f"on 7 of {number} loaded nodes, evenly spread")
+        choose(view, view.structure.loads, False)
+        assert arrows() == (0, [])
+        assert (
+            "the weight of the nodes, as of balls, is not counted; the schedules in Out say"
+            in view.structure.results.content
+        )

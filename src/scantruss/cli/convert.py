@@ -119,12 +119,12 @@ def write_models(
     say_losses: bool = True,
 ) -> list[Path]:
     """Write a model in several formats, say once what each does not hold if that is wanted, and return the places of all files."""
-    from ..export.formats import losses, write
+    from ..export.formats import losses, shown_otherwise, write
 
     written: list[Path] = []
     for number, out in enumerate(outs):
         bars("write", number / len(outs))
         written += [out.with_name(file.name) for file in write(model, save.beside(out), style=style)]
-        for note in losses(model, out) if say_losses else ():
+        for note in (*(losses(model, out) if say_losses else ()), *shown_otherwise(model, out)):
             bars.note_once(note)
     return written

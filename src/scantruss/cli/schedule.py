@@ -7,15 +7,11 @@ from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..errors import InputError, words_of_number
-from ..grid.alike import JOINTS, PANELS
+from ..errors import InputError
 from .grids import add_grid, read_grid_or_structure
 from .outputs import claim, outs_of, wrote_line
 
 if TYPE_CHECKING:
-    from ..grid.alike import Alike
-    from ..schedules.records import Schedule, Schedules
-    from ..schedules.settings import ScheduleSettings
     from .options import Parser
 
 
@@ -123,6 +119,7 @@ def make_schedule(values: Namespace) -> None:
     from ..runtime.files import SaveTogether
     from ..runtime.places import check_place
     from ..schedules.files import SCHEDULE_SUFFIXES, schedule_paths, write_schedules
+    from ..schedules.lines import schedule_lines
     from ..schedules.settings import ScheduleSettings
 
     outs = [check_place(out, SCHEDULE_SUFFIXES) for out in outs_of(values)]
@@ -149,62 +146,3 @@ def make_schedule(values: Namespace) -> None:
             bars("write", number / len(outs))
             files[out] = len(write_schedules(made, save.beside(out)))
     print_lines([*schedule_lines(made, settings, what.alike), wrote_line(files)])
-
-
-def schedule_lines(made: Schedules, settings: ScheduleSettings, alike: Alike | None = None) -> list[str]:
-    """Say how much there is of what, and what is warned of; `alike` says which parts were made so."""
-    within = {JOINTS: f"{settings.angle_tolerance:g} degrees", PANELS: f"{settings.tolerance:g} mm"}
-    if alike is not None and alike.parts in within:
-        within[alike.parts] = f"{100 * alike.tolerance:g} %, as they were made alike"
-    cut = sum(value for value in made.lengths["total"] if isinstance(value, float))
-    lines = [
-        f"{len(made.nodes):,} nodes of {len(made.node_types):,} types within {within[JOINTS]}"
-        + mirrored_words(made.node_types),
-        f"{len(made.members):,} members of {len(made.lengths):,} lengths within {settings.tolerance:g} mm, cut {words_of_number(cut, 4)} m",
-        f"{len(made.panels):,} panels of {len(made.panel_types):,} types within {within[PANELS]}"
-        + mirrored_words(made.panel_types),
-    ]
-    return [*lines, *warning_lines(made.warnings)]
-
-
-def mirrored_words(types: Schedule) -> str:
-    """Say how many types there are if mirror images count once; nothing where there are as many."""
-    if all(each.name != "mirror image" for each in types.columns):
-        return ""
-    first = types.columns[0].values
-    seen = {
-        frozenset((own, image)) for own, image in zip(first, types["mirror image"], strict=True) if image is not None
-    }
-    alone = sum(image is None for image in types["mirror image"])
-    once = len(seen) + alone
-    return f", {once:,} if mirror images count once" if once < len(first) else ""
-
-
-def warning_lines(warnings: Schedule) -> list[str]:
-    """Say of each kind of warning how many there are, and the worst."""
-    from ..schedules.clashes import HEAVY_BALLS
-    from ..structure.loads import MOST_ALLOWANCE
-
-    lines = []
-    for words in dict.fromkeys(warnings["warning"]):
-        rows = [row for row in warnings.rows if row[0] == words]
-        _, at, _, worst, given, measure, *_ = max(rows, key=lambda row: abs(float(row[3] or 0) - float(row[4] or 0)))
-        value, limit = float(worst or 0), None if given is None else float(given)
-        most = f"{words_of_number(value, 4)} {measure}".rstrip() + ("" if at is None else f" at {at}")
-        if words == HEAVY_BALLS and limit is not None:
-            way = (
-                f"structure --node-allowance {value / 100:.2f} takes that into account"
-                if value <= 100 * MOST_ALLOWANCE
-                else f"structure takes {MOST_ALLOWANCE:.0%} at most: thinner tubes or longer members make balls lighter beside them"
-            )
-            lines.append(
-                f"warning: the balls weigh {value:.0f} % of the members, and the structure was solved with {limit:.0f} % for its nodes;"
-                f" {way}"
-            )
-        elif limit is None:  # what is never carried at all
-            lines.append(f"warning: {words}; the greatest is {most}")
-        elif len(rows) == 1:
-            lines.append(f"warning: {words}: {most}, limit {words_of_number(limit, 4)}")
-        else:
-            lines.append(f"warning: {words}: {len(rows):,}, the worst {most}, limit {words_of_number(limit, 4)}")
-    return lines

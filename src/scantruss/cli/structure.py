@@ -112,7 +112,7 @@ def structure(values: Namespace) -> None:
     if plot is not None:
         claim(plot, "picture", taken, force=values.force)
     from ..grid.certificate import check_passed
-    from ..structure.doubts import support_words
+    from ..structure.doubts import doubts_of_settings, support_words
     from ..structure.modes import vibration_modes, worst_buckling
     from ..structure.path_report import encode_path, path_expectation
     from ..structure.report import report_structure
@@ -120,6 +120,7 @@ def structure(values: Namespace) -> None:
         STRUCTURE_HEAD,
         half_lines,
         mode_lines,
+        node_lines,
         sizing_lines,
         structure_lines,
         unlisted_lines,
@@ -154,7 +155,7 @@ def structure(values: Namespace) -> None:
         found: dict[str, Any] = {
             "buckling": buckling, "vibration": vibration, "path": path, "rounds": rounds, "weights": weights
         }  # fmt: skip
-        report = report_structure(solution, settings.checks, _notes(settings), **found)
+        report = report_structure(solution, settings.checks, doubts_of_settings(settings, grid), **found)
         bars("report", 0.0)
         models = [out for out in outs if out.suffix.lower() not in REPORT_SUFFIXES]
         written = write_models(model_of(solution, report=report), models, save, bars)
@@ -180,6 +181,7 @@ def structure(values: Namespace) -> None:
             *half_lines(report),
             f"{len(truss.nodes):,} nodes, {len(truss.members):,} members of {names} {truss.material.name},"
             f" {truss.lengths.mean():.3g} m long on average, {truss.mass:,.0f} kg without nodes",
+            *node_lines(truss),
             support_words(truss),
             *sizing_lines(report),
             *mode_lines(report),
@@ -280,14 +282,3 @@ def _nodes_near(grid: Grid, path: str) -> np.ndarray:
             raise InputError(f"{path}: no node lies within half a member, {reach:.3g} {grid.unit}, of {words}")
         found.append(int(distance.argmin()))
     return np.unique(found)
-
-
-def _notes(settings: StructureSettings) -> list[str]:
-    """Return warnings of what was taken for granted."""
-    from ..structure.options import units_taken
-
-    words = [str(load.get("load", "")) if isinstance(load, dict) else str(load) for load in settings.loads]
-    notes = units_taken(settings.loads)
-    if any(word.startswith("wind:") and ":" not in word[5:] for word in words):
-        notes += ["wind without a coefficient presses with 1.0 everywhere; give one, as in wind:0.8kN/m2:-0.7"]
-    return notes

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import FormatError, InputError
 from ..grid.grid import Grid
+from ..grid.upward import picture_notes
 from ..runtime.files import write_files
 from ..runtime.memory import nothing_collected
 from ..runtime.places import check_place, nearest_suffix, suffix_of
@@ -201,6 +202,12 @@ def losses(model: Model, path: str | Path) -> list[str]:
     words = ", ".join(each for each in lost if each)
     unplaced = f"the reference system is not known, so {row.name} names none; give it with --system EPSG:CODE"
     return [f"{row.name} holds no {words}"] * bool(words) + [unplaced] * (row.wants_system and not model.system)
+
+
+def shown_otherwise(model: Model, path: str | Path) -> list[str]:
+    """Return a note where a picture of a grid shows another axis up than z, which all files have up; none of other formats."""
+    is_of_grid = suffix_of(Path(path), FORMATS) == ".png" and model.truss is None and model.grid is not None
+    return picture_notes(model.grid, model.cloud) if is_of_grid and model.grid is not None else []
 
 
 def model_of(

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..grid.grid import Grid
+from ..grid.upward import OPEN_SHELL, facing_of, guessed_up
+from .options import StructureSettings, units_taken
 from .truss import Truss
 
 #: share of the surface that faces one way on the mean; ratio of its parts along x or y and along z: it may lie on its side
@@ -45,6 +48,26 @@ def doubts_of(truss: Truss) -> list[str]:
             f"the combinations that were given have none of {missing}; those of EN 1990 are not added to them"
         )
     return warnings
+
+
+def doubts_of_settings(settings: StructureSettings, grid: Grid) -> list[str]:
+    """Return warnings of what was taken for granted of the loads, and of which way is up."""
+    words = [str(load.get("load", "")) if isinstance(load, dict) else str(load) for load in settings.loads]
+    notes = units_taken(settings.loads)
+    if any(word.startswith("wind:") and ":" not in word[5:] for word in words):
+        notes += ["wind without a coefficient presses with 1.0 everywhere; give one, as in wind:0.8kN/m2:-0.7"]
+    return [*notes, *_lying(grid)]
+
+
+def _lying(grid: Grid) -> list[str]:
+    """Return a warning where pictures of a closed grid, as of a sculpture with y up, show another axis up than that of weight."""
+    up = guessed_up(grid)
+    if not up or np.linalg.norm(facing_of(grid.nodes, grid.triangles)) > OPEN_SHELL:  # which `_sideways` judges
+        return []
+    return [
+        f"weight acts along -z, and pictures of the structure have z up; pictures of the grid show {up} up, as its shape tells:"
+        f" where {up} is up in the file, turn the scan first, as scantruss studio does"
+    ]
 
 
 def _sideways(truss: Truss) -> list[str]:

@@ -6,6 +6,7 @@ from ..errors import words_of_number
 from .checks import use_words
 from .path_report import path_words
 from .report import CaseFigures, StructureReport
+from .truss import Truss
 
 STRUCTURE_HEAD = (
     "load case", "applied z [kN]", "reaction z [kN]", "moves [mm]", "force min [kN]", "force max [kN]", "utilization",
@@ -67,6 +68,18 @@ def half_lines(report: StructureReport) -> list[str]:
     most = f", {which} uses the members most, {use_words(used.utilization_max)}" if used.utilization_max else ""
     return [
         f"of {len(part_loaded)} cases with half the snow, {moved.name} moves the nodes most, {1e3 * moved.displacement_max:.3g} mm{most}"
+    ]
+
+
+def node_lines(truss: Truss) -> list[str]:
+    """Return a line on what the nodes weigh in the loads; nothing where the members weigh nothing either."""
+    allowed = max((case.self_weight for case in truss.cases), default=0.0) - 1.0
+    if allowed < 0.0:
+        return []
+    if allowed:
+        return [f"the weight of the nodes counts with {100 * allowed:.3g} % of that of the members"]
+    return [
+        "the weight of the nodes, as of balls, is not counted; --node-allowance 0.15 adds 15 % of that of the members"
     ]
 
 

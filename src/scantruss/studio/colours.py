@@ -84,12 +84,15 @@ def legend_of(words: str, unit: str, low: float, high: float, diverging: bool) -
     return ColourLegend(words, unit, (low, high), stops)
 
 
-def legend_of_names(words: str, names: Sequence[str], numbers: np.ndarray) -> ColourLegend:
-    """Return the legend of what has one of some names, by their numbers from 1 (N,): a mark for each, with how many there are."""
+def legend_of_names(words: str, names: Sequence[str], *numbers: np.ndarray) -> ColourLegend:
+    """Return the legend of what has one of some names, by numbers from 1, (N,) of each design: a mark for each, with how many there are."""
     colors, _, _ = colors_of(1.0 + np.arange(len(names)), None)
-    counts = np.bincount(numbers.astype(np.int64), minlength=len(names) + 1)[1:]
+    counts = np.stack([np.bincount(each.astype(np.int64), minlength=len(names) + 1)[1:] for each in numbers], axis=1)
     rows = zip(names, colors.tolist(), counts.tolist(), strict=True)
-    return ColourLegend(words, marks=tuple(((r, g, b), f"{name}, {count:,}") for name, (r, g, b), count in rows))
+    return ColourLegend(
+        words,
+        marks=tuple(((r, g, b), f"{name}, {' and '.join(f'{k:,}' for k in held)}") for name, (r, g, b), held in rows),
+    )
 
 
 def rgb_of(color: str) -> tuple[int, int, int]:

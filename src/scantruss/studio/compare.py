@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import weakref
 from html import escape
 from typing import Any
@@ -10,13 +11,14 @@ import numpy as np
 
 from ..check.distances import distances_to_grid
 from ..errors import InputError, words_of_number
-from ..export.model import model_of_truss
+from ..export.formats import model_of
+from ..export.page_tables import tables_of
 from ..grid.grid import Grid
 from ..structure.build import scale_of
 from ..structure.checks import use_words
-from ..structure.truss import Truss
-from ..structure.variants import truss_arguments
+from .colouring import DrawnDesign
 from .layers_tool import figures_of_layers
+from .solving import solved_state
 from .state import NO_GRID, Design, StudioState
 from .support_places import supports_on
 
@@ -37,7 +39,6 @@ def kept_design(state: StudioState, name: str) -> Design:
         raise InputError("there is no grid yet; press Generate")
     if not 0 < len(name) <= LONGEST_NAME:
         raise InputError(f"a design needs a name of 1 to {LONGEST_NAME} letters")
-    layered = state.shown_structure if state.solution is not None and state.solution.truss.layers is not None else None
     return Design(
         name,
         state.grid,
@@ -46,23 +47,30 @@ def kept_design(state: StudioState, name: str) -> Design:
         state.asked,
         state.unpainted,
         state.is_live,
-        layered,
+        None if state.solution is None else state.shown_structure,
+        state.solution,
+        state.report,
     )
 
 
-def drawn_members(design: Design) -> tuple[np.ndarray, np.ndarray]:
-    """Return what is drawn of a design: nodes (V, 3) in the frame of the scan [scan unit], and members (M, 2), of all layers."""
-    grid, asked = design.grid, design.layered
-    if asked is None:
-        return grid.scan_nodes, grid.edges
-    if design not in _LAYERED:
-        metres = scale_of(grid.unit or asked.unit, asked.scale)
-        model = model_of_truss(Truss.from_grid(grid, **truss_arguments(asked)))
-        _LAYERED[design] = model.nodes / metres, model.members
-    return _LAYERED[design]
+def drawn_design(design: Design) -> DrawnDesign:
+    """Return what is drawn of a design: its structure, solved again where it came with a project, else its grid."""
+    if design not in _DRAWN:
+        grid, asked, solution, report = design.grid, design.solved_with, design.solution, design.report
+        if asked is not None and solution is None:
+            again = StudioState(grid=grid, structure_settings=asked.replace(buckling=0, frequencies=0))
+            with contextlib.suppress(InputError):
+                solved = solved_state(again)
+                solution, report = solved.solution, solved.report
+        if solution is None or asked is None:
+            model, unit_of_scan = model_of(grid), 1.0
+        else:
+            model, unit_of_scan = model_of(solution, report=report), scale_of(grid.unit or asked.unit, asked.scale)
+        _DRAWN[design] = DrawnDesign(model, tables_of(model, grid), unit_of_scan)
+    return _DRAWN[design]
 
 
-_LAYERED: weakref.WeakKeyDictionary[Design, tuple[np.ndarray, np.ndarray]] = weakref.WeakKeyDictionary()
+_DRAWN: weakref.WeakKeyDictionary[Design, DrawnDesign] = weakref.WeakKeyDictionary()
 
 
 def taken_design(state: StudioState, name: str) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from ..errors import InputError
 from ..export.formats import GRID, STRUCTURE
 from ..runtime.files import temporary_folder
 from ..settings import UNITS
-from .outputs import command_of, model_to_show
+from .outputs import Note, command_of, model_to_show, unsaid
 from .state import StudioState
 
 SCHEDULES = "schedules .xlsx"
@@ -19,13 +19,15 @@ FURTHER_FILES = (SCHEDULES, GRID_REPORT, *STRUCTURE_REPORTS, PRINTED)
 PRINTED_MEMBER, PRINTED_BALL = 1.2, 2.0  #: diameters of a model that is printed [mm]
 
 
-def further_files(state: StudioState, what: str, printed_size: float) -> dict[str, bytes]:
+def further_files(state: StudioState, what: str, printed_size: float, note: Note = unsaid) -> dict[str, bytes]:
     """Return the files of one of `FURTHER_FILES` by their names.
 
     Parameters
     ----------
     printed_size : float
         Longest side of the model to print [mm].
+    note : callable
+        ``note(words)`` takes what the command line would say of them.
 
     Raises
     ------
@@ -33,9 +35,9 @@ def further_files(state: StudioState, what: str, printed_size: float) -> dict[st
         There is nothing to write, or it cannot be made.
     """
     if what == SCHEDULES:
-        return _schedules(state)
+        return _schedules(state, note)
     if what == PRINTED:
-        return _printed(state, printed_size)
+        return _printed(state, printed_size, note)
     if what == GRID_REPORT:
         from ..report.grid_page import encode_grid_report
 
@@ -45,8 +47,9 @@ def further_files(state: StudioState, what: str, printed_size: float) -> dict[st
     return _structure_report(state, Path(what).suffix)
 
 
-def _schedules(state: StudioState) -> dict[str, bytes]:
+def _schedules(state: StudioState, note: Note) -> dict[str, bytes]:
     from ..schedules.files import write_schedules
+    from ..schedules.lines import schedule_lines
     from ..schedules.make import schedule
     from ..schedules.settings import ScheduleSettings
 
@@ -54,8 +57,12 @@ def _schedules(state: StudioState) -> dict[str, bytes]:
     assert state.grid is not None
     what = state.grid if state.solution is None else state.solution.truss
     unit = state.settings.unit if state.solution is None and not state.grid.unit else ""
+    settings = ScheduleSettings(unit=unit)
+    made = schedule(what, settings)
+    for words in schedule_lines(made, settings, what.alike):
+        note(words)
     with temporary_folder() as folder:
-        write_schedules(schedule(what, ScheduleSettings(unit=unit)), folder / "schedules.xlsx")
+        write_schedules(made, folder / "schedules.xlsx")
         return {"schedules.xlsx": (folder / "schedules.xlsx").read_bytes()}
 
 
@@ -76,7 +83,7 @@ def _structure_report(state: StudioState, suffix: str) -> dict[str, bytes]:
     return {"structure-report.html": encode_html(parts, encode_page(model, FileStyle()))}
 
 
-def _printed(state: StudioState, size: float) -> dict[str, bytes]:
+def _printed(state: StudioState, size: float, note: Note) -> dict[str, bytes]:
     from ..export.printed.apart import print_apart
     from ..structure.layered import grid_in_metres
 
@@ -94,8 +101,10 @@ def _printed(state: StudioState, size: float) -> dict[str, bytes]:
     millimetre = 1e-3 / metres
     scale = size * millimetre / float((grid.nodes.max(axis=0) - grid.nodes.min(axis=0)).max())
     with temporary_folder() as folder:
-        print_apart(
+        solid = print_apart(
             grid, folder / "model.3mf", scale=scale, member_diameter=PRINTED_MEMBER * millimetre,
             node_diameter=PRINTED_BALL * millimetre,
         )  # fmt: skip
+        for words in solid.notes:
+            note(words)
         return {"model.3mf": (folder / "model.3mf").read_bytes()}

@@ -6,6 +6,7 @@ It is always as high, so that nothing below it moves under a pointer.
 from __future__ import annotations
 
 from html import escape
+from time import monotonic
 from typing import Any
 
 from .scan_steps import LARGEST_UPLOAD, TOO_LARGE
@@ -26,7 +27,7 @@ class Head:
         """Show what a session is at."""
         taken = [f"{way}: {what}" for way, what in zip(WAYS_BACK, session.history.words, strict=True) if what]
         self._words.content = (
-            f'<div class="studio-head"><div role="status">{words_of_session(session)}</div>'
+            f'<div class="studio-head"><div role="status">{words_of_session(session)}{time_of_session(session)}</div>'
             f"<small>{escape(' · '.join(taken)) or '&nbsp;'}</small></div>"
         )
         self._progress.value = 100.0 * session.share if session.stage else 0.0
@@ -47,6 +48,14 @@ def words_of_session(session: Session) -> str:
     if session.state.is_structure_stale:
         return "The structure was solved before the last change: press <b>Run</b>"
     return "ready"
+
+
+def time_of_session(session: Session) -> str:
+    """Return for how long a session has been at what runs, as HTML; the page lets it go on by itself (`page_script.js`)."""
+    if not session.stage or session.message:
+        return ""
+    seconds = int(monotonic() - session.began)
+    return f' <span aria-hidden="true" data-seconds="{seconds}">{f"{seconds} s" if seconds else ""}</span>'
 
 
 def words_of_large_upload() -> str:

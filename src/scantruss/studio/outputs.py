@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import json
 import shlex
+from collections.abc import Callable
 from pathlib import Path
 
 from ..errors import InputError
-from ..export.formats import STRUCTURE, check_output, check_unit, model_of, suffixes_of, write
+from ..export.formats import STRUCTURE, check_output, check_unit, losses, model_of, shown_otherwise, suffixes_of, write
 from ..export.model import Model
 from ..runtime.files import temporary_folder
 from ..scan.formats.writing import write_points
@@ -20,6 +21,13 @@ TAKEN = "taken.ply"  # the points that are taken, where some were removed by han
 EFFORT_OF_PREVIEW = "quick"
 PREVIEW_WORDS = "this is the quick preview; press **Generate** for the final grid"
 CLEANED = "clean.ply"  # the scan without the points that were removed
+
+
+Note = Callable[[str], None]
+
+
+def unsaid(words: str) -> None:
+    """Take a note that nobody wants."""
 
 
 def model_to_show(state: StudioState, kind: str) -> Model:
@@ -39,8 +47,13 @@ def model_to_show(state: StudioState, kind: str) -> Model:
     return model_of(state.grid, cloud=state.cloud)
 
 
-def files_of(state: StudioState, kind: str, suffix: str) -> dict[str, bytes]:
+def files_of(state: StudioState, kind: str, suffix: str, note: Note = unsaid) -> dict[str, bytes]:
     """Return the files of a format by their names.
+
+    Parameters
+    ----------
+    note : callable
+        ``note(words)`` takes what the command line would say of them.
 
     Raises
     ------
@@ -53,7 +66,10 @@ def files_of(state: StudioState, kind: str, suffix: str) -> dict[str, bytes]:
     with temporary_folder() as folder:
         path = check_output(folder / f"{kind}{suffix}", kind)
         check_unit(path, model.unit)
-        return {file.name: file.read_bytes() for file in write(model, path)}
+        files = {file.name: file.read_bytes() for file in write(model, path)}
+    for words in (*losses(model, path), *shown_otherwise(model, path)):
+        note(words)
+    return files
 
 
 def project_file(state: StudioState, place: Path | None) -> dict[str, bytes]:

@@ -2,6 +2,7 @@
 
 const NAMES = { "mantine-Notification-closeButton": "Close", "tabler-icon-list-search": "Commands", "tabler-icon-adjustments": "Diagnostics",
   "tabler-icon-arrow-back": "Back" };
+const ROOM_FOR_HINT = 270;  // beside the panel, that its words need [pixel]
 const CROSS_STEP = 10;  // of an arrow key; with Alt held a tenth of it [pixel]
 
 const isOpen = (head) => head.nextElementSibling?.getAttribute("aria-hidden") !== "true";
@@ -24,6 +25,11 @@ const complete = () => {
   for (const each of document.querySelectorAll("button[data-size=compact-xs]:not([title])")) {
     const words = hints[labelOf(each)]?.[each.textContent.trim()];
     if (words) each.title = words;  // which come after the first of the rows
+  }
+  if (document.querySelector(".mantine-Tooltip-tooltip")) {  // beside the panel, where it covers no control (`style.py`)
+    const left = document.querySelector(".studio-head")?.getBoundingClientRect().left ?? 0;
+    document.documentElement.style.setProperty("--studio-panel", `${left}px`);
+    document.documentElement.toggleAttribute("data-hints-aside", left > ROOM_FOR_HINT);
   }
   const drawing = drawn();
   if (drawing && !drawing.hasAttribute("tabindex")) prepare(drawing);

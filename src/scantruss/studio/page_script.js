@@ -76,3 +76,12 @@ const tellTabs = () => {
 };
 addEventListener("DOMContentLoaded", () =>
   new MutationObserver(tellTabs).observe(document.body, { subtree: true, attributes: true, attributeFilter: ["aria-selected"] }));
+
+// The time of what runs goes on from second to second, whatever the server is busy with; what it says anew counts.
+setInterval(() => {
+  for (const each of document.querySelectorAll("[data-seconds]")) {
+    each.dataset.since ??= performance.now();
+    const seconds = Math.floor(Number(each.dataset.seconds) + (performance.now() - Number(each.dataset.since)) / 1000);
+    if (seconds) each.textContent = `${seconds} s`;
+  }
+}, 1000);

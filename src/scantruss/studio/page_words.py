@@ -28,6 +28,8 @@ PHRASES = tuple(
         (r"\(--rows curvature\)", "(Design, rows follow)"),
         (r"(?:make it with|give it) --loads", "name some in loads, and press Run"),
         (r"with --crop or --piece", "with Scan, Crop"),
+        (r"; --node-allowance 0\.15 adds 15 % of that of the members", "; the schedules in Out say how much balls weigh"),
+        (r"turn the scan first, (?:as scantruss studio does|so that z is)", "choose that in Scan, up"),
         (r"; --keep-failed (?:gives it all the same|uses it anyway)", ""),
     )
 )  # fmt: skip

@@ -100,12 +100,12 @@ def _head_of_design(design: Design, state: StudioState) -> dict[str, Any]:
         "name": design.name, "figures": [list(row) for row in design.figures], "of_scan": design.cloud is state.cloud,
         "asked": None if design.asked is None else design.asked.to_dict(), "unpainted": design.unpainted,
         "quick": design.is_live,
-        "layered": None if design.layered is None else settings_text(design.layered),
+        "structure": None if design.solved_with is None else settings_text(design.solved_with),
     }  # fmt: skip
 
 
 def _design_of(head: dict[str, Any], grid: Grid, cloud: PointCloud) -> Design:
-    asked, layered = head.get("asked"), head.get("layered")
+    asked, structure = head.get("asked"), head.get("structure", head.get("layered"))  # of layers only, once
     return Design(
         head["name"],
         grid,
@@ -114,7 +114,7 @@ def _design_of(head: dict[str, Any], grid: Grid, cloud: PointCloud) -> Design:
         None if asked is None else Settings.from_dict(asked),
         float(head.get("unpainted", 1.0)),
         bool(head.get("quick", False)),
-        None if layered is None else _structure_settings_of(layered.encode()),
+        None if structure is None else _structure_settings_of(structure.encode()),
     )
 
 

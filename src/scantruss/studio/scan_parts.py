@@ -9,7 +9,7 @@ import numpy as np
 from ..errors import InputError
 from ..scan.clean.steps import clean_points
 from ..scan.cloud import PointCloud
-from ..scan.formats.choose import choose, describe_points
+from ..scan.formats.choose import choose, cropped_boxes, describe_points
 from ..selection import Selection
 from ..settings import Settings
 
@@ -92,19 +92,7 @@ def taken_of_scan(
         No point is left.
     """
     cloud = whole.cloud
-    kept = np.ones(len(cloud.points), np.bool_)
-    if settings.classes or settings.crop:
-        places = cloud.points + cloud.origin
-        attributes = {} if whole.classes is None else {"class": whole.classes}
-        if settings.classes and not attributes:
-            raise InputError(f"{cloud.name or 'the scan'} has no classes to choose from")
-        kept, left_out = choose(places, attributes, Selection(classes=settings.classes, crop=settings.crop))
-        if not kept.any():
-            said = ", ".join(f"{count:,} {words}" for words, count in left_out.items() if count)
-            held = describe_points(places, attributes)
-            raise InputError(
-                f"no point of {cloud.name or 'the scan'} is left: of {len(places):,} points {said}; the scan has{held}"
-            )
+    kept, _ = selected(whole, settings)
     for goes in (None if cleaning is None else cleaning.removes, removed):
         if goes is not None:
             kept = kept & ~goes
@@ -113,11 +101,42 @@ def taken_of_scan(
     return kept
 
 
+def selected(whole: WholeScan, settings: Settings) -> tuple[np.ndarray, dict[str, int]]:
+    """Return which points of a scan have the classes and lie in the crop of the settings (N,), and how many do not, by its words.
+
+    Raises
+    ------
+    InputError
+        No point does.
+    """
+    cloud = whole.cloud
+    if not (settings.classes or settings.crop):
+        return np.ones(len(cloud.points), np.bool_), {}
+    places = cloud.points + cloud.origin
+    attributes = {} if whole.classes is None else {"class": whole.classes}
+    if settings.classes and not attributes:
+        raise InputError(f"{cloud.name or 'the scan'} has no classes to choose from")
+    kept, left_out = choose(places, attributes, Selection(classes=settings.classes, crop=settings.crop))
+    if not kept.any():
+        said = ", ".join(f"{count:,} {words}" for words, count in left_out.items() if count)
+        held = describe_points(places, attributes)
+        raise InputError(
+            f"no point of {cloud.name or 'the scan'} is left: of {len(places):,} points {said}; the scan has{held}"
+        )
+    return kept, left_out
+
+
 def part_of_scan(
     whole: WholeScan, settings: Settings, cleaning: Cleaning | None = None, removed: np.ndarray | None = None
 ) -> PointCloud:
-    """Return the points that are taken; see `taken_of_scan`."""
-    return _taken(whole.cloud, taken_of_scan(whole, settings, cleaning, removed))
+    """Return the points that are taken, see `taken_of_scan`, as if they were read: what options leave out of its file is counted."""
+    part = _taken(whole.cloud, taken_of_scan(whole, settings, cleaning, removed))
+    if cleaning is not None or removed is not None or whole.up != "z" or part is whole.cloud:
+        return part  # of a file that holds no other points
+    kept, counts = selected(whole, settings)
+    boxes = cropped_boxes(whole.cloud.points + whole.cloud.origin, kept, Selection(crop=settings.crop))
+    counted = tuple((words, count) for words, count in counts.items() if count)
+    return replace(part, left_out=(*part.left_out, *counted), cropped=tuple(boxes.items()))
 
 
 def turned(whole: WholeScan, up: str) -> WholeScan:

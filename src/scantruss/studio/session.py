@@ -22,7 +22,7 @@ from ..structure.options import loads_of_words
 from ..surface.samples import sample_surface
 from .compare import kept_design, taken_design
 from .features import Feature, corners_of, find_features, switched_off
-from .outputs import EFFORT_OF_PREVIEW, command_of, files_of, model_to_show
+from .outputs import EFFORT_OF_PREVIEW, Note, command_of, files_of, model_to_show, unsaid
 from .solving import check_words, solved_state
 from .state import NO_GRID, StudioState
 from .support_places import placed, supports_on
@@ -314,9 +314,9 @@ class Session(TradeSteps):
         """Return the grid or the structure; see `outputs.model_to_show`."""
         return model_to_show(self.state, kind)
 
-    def files(self, kind: str, suffix: str) -> dict[str, bytes]:
+    def files(self, kind: str, suffix: str, note: Note = unsaid) -> dict[str, bytes]:
         """Return the files of a format by their names; see `outputs.files_of`."""
-        return files_of(self.state, kind, suffix)
+        return files_of(self.state, kind, suffix, note)
 
     def command(self) -> str:
         """Return the command lines that repeat the grid and the structure."""

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from ..errors import InputError
 from ..runtime.progress import Progress
+from ..structure.doubts import doubts_of_settings
 from ..structure.modes import vibration_modes, worst_buckling
 from ..structure.report import report_structure
 from ..structure.sizing import SizingRound, size_members, weight_curve
@@ -70,7 +71,13 @@ def solved_state(state: StudioState, progress: Progress = _silent) -> StudioStat
     buckling = worst_buckling(factored, solution, count) if count else None
     vibration = vibration_modes(factored, asked.frequencies) if asked.frequencies else None
     report = report_structure(
-        solution, asked.checks, buckling=buckling, vibration=vibration, rounds=rounds, weights=weights
+        solution,
+        asked.checks,
+        doubts_of_settings(asked, state.grid),
+        buckling=buckling,
+        vibration=vibration,
+        rounds=rounds,
+        weights=weights,
     )
     return replace(state, solution=solution, report=report, solved_with=asked)
 

@@ -34,7 +34,9 @@ class Design:
     asked: Settings | None = None  #: with which it was asked for
     unpainted: float = 1.0  #: see `StudioState`
     is_live: bool = False  #: whether it is a quick one
-    layered: StructureSettings | None = None  #: with which a structure of more layers was made of it, which are drawn
+    solved_with: StructureSettings | None = None  #: with which a structure was made of it, which is drawn
+    solution: Solution | None = None  #: of that; None where it has to be solved again, as of a project that was opened
+    report: StructureReport | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from threading import RLock
+from time import monotonic
 from typing import Any
 
 from ..grid.grid import Grid
@@ -37,6 +38,7 @@ class Steps:
         self.history = History()
         self.message = ""  #: why the last step was refused, in the words of the command line
         self.stage, self.share = "", 0.0
+        self.began = 0.0  #: when what runs began, by the clock of `time.monotonic` [s]
         self.was_stopped = False  #: whether the last task was
         self.worker = Worker(self._end, self._progress)
         self._listeners: list[Callable[[], None]] = []
@@ -145,6 +147,8 @@ class Steps:
 
     def _progress(self, stage: str, share: float) -> None:
         changed = stage != self.stage or abs(share - self.share) >= 0.02
+        if not self.stage:
+            self.began = monotonic()
         self.stage, self.share, self.was_stopped = stage, share, False
         if changed:
             self.tell()

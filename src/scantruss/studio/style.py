@@ -39,6 +39,9 @@ div:has(> .studio-head) + div + div + div + div { top: 112px; height: 34px }
 @media (max-height: 560px) { div:has(> .studio-head) ~ div { position: static !important } }
 .studio-refused { font-size: .85em; line-height: 1.06 }
 .studio-head > small { display: block; overflow: hidden; text-overflow: ellipsis; white-space: nowrap }
+[data-hints-aside] .mantine-Tooltip-tooltip {
+  left: auto !important; right: calc(100vw - var(--studio-panel) + 12px) !important; translate: 0 calc(50% + 1.1rem) }
+[data-hints-aside] .mantine-Tooltip-arrow { display: none }
 pre { white-space: pre-wrap !important; overflow-wrap: anywhere }
 .mantine-ScrollArea-viewport { overflow-x: hidden !important }
 .mantine-ScrollArea-viewport > div { padding-right: 7px }

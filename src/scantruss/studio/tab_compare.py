@@ -6,9 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .colours import colors_of, legend_of
-from .compare import comparison, deviation, drawn_members, kept_design
+from .colouring import DrawnDesign
+from .colours import PLAIN, colors_of, legend_of
+from .compare import comparison, deviation, drawn_design, kept_design
 from .frame import BESIDE_FIRST, DRAWN_EXTENT
+from .scene import drawn_colors
 from .state import Design
 
 if TYPE_CHECKING:
@@ -36,19 +38,19 @@ class CompareTab:
         self.distance = gui.add_checkbox("colour by distance", False, hint="of its nodes from the present one")
         self.taken = gui.add_button(TAKE.format("it"), disabled=True, hint="Undo takes that back")
         drop = gui.add_button("Forget that design")
-        self.table = gui.add_html("")
+        self.lack, self.table = gui.add_markdown("", visible=False), gui.add_html("")
+        self._drawn: Design | None = None
         view.corrects(self.name)
         keep.on_click(view.step(lambda: view.session.keep_design(self.name.value)))
         drop.on_click(view.step(self._drop))
         self.taken.on_click(view.step(lambda: view.session.take_design(self.other.value)))
         self.other.on_update(view.step(self._choose))
         self.over.on_update(view.step(self._lay_over))
-        self.distance.on_update(view.step(lambda: self._draw(view.session.state)))
+        self.distance.on_update(view.step(lambda: view.look.choose_again()))
 
     def _choose(self) -> None:
-        self._draw(self.view.session.state)
         self.view.overview(self.beside)
-        self.view.look.draw()
+        self.view.look.choose_again()
 
     @property
     def beside(self) -> int:
@@ -63,6 +65,28 @@ class CompareTab:
     def is_over(self) -> bool:
         """Whether a design is drawn over the present one."""
         return bool(self.over.value) and self.other.value != NO_OTHER
+
+    @property
+    def is_by_distance(self) -> bool:
+        """Whether a design is coloured by its distance from the present one, which is plain then."""
+        state = self.view.session.state
+        return bool(self.distance.value) and self._chosen(state) is not None and state.grid is not None
+
+    @property
+    def drawn(self) -> DrawnDesign | None:
+        """The design that is coloured by the same as the present one; None where there is none."""
+        chosen = self._chosen(self.view.session.state)
+        return None if chosen is None or self.is_by_distance else drawn_design(chosen)
+
+    def say_lack(self, wanted: str) -> None:
+        """Say which colouring the chosen design does not have; "" where it has what is wanted."""
+        chosen, self.lack.visible = self._chosen(self.view.session.state), bool(wanted)
+        if chosen is not None and wanted:
+            has_none = drawn_design(chosen).model.truss is None and self.view.session.solution is not None
+            why = "has no structure: no" if has_none else "has no"
+            self.lack.content = (
+                f"**{chosen.name}** {why} {wanted}; both are coloured by {self.view.look.coloring.value}"
+            )
 
     def _drop(self) -> None:
         if self.other.value != NO_OTHER:
@@ -88,34 +112,46 @@ class CompareTab:
         if state.grid is not None:
             shown.append(kept_design(state, PRESENT))
         self.table.content = comparison(shown) if state.designs else ""
-        self._draw(state)
+        if self._chosen(state) is not self._drawn:
+            self.view.look.choose_again()
 
-    def _draw(self, state: StudioState) -> None:
+    def draw(self) -> None:
+        """Draw the chosen design beside the present one or over it, in colours that both share."""
+        state = self.view.session.state
         scene, chosen = self.view.scene, self._chosen(state)
+        self._drawn = chosen
         self.taken.disabled = chosen is None
         self.taken.label = TAKE.format("it" if chosen is None else chosen.name)
         if chosen is None or state.cloud is None:
             self.view.legends.show("beside", None)
-            scene.remove("/beside/members", "/beside/panels", "/beside/name", "/beside/present")
+            scene.remove("/beside/members", "/beside/nodes", "/beside/name", "/beside/present")
+            scene.remove("/beside/panels", "/beside/panels coloured")
             return
         frame = self.view.frame
         aside = 0.0 if self.is_over else BESIDE_FIRST * DRAWN_EXTENT
         there = np.array([aside, 0.0, 0.0], np.float32)
-        all_nodes, members = drawn_members(chosen)
-        nodes, corners = (frame.to_scene(each) + there for each in (all_nodes, chosen.grid.scan_nodes))
-        values, words = lengths_of(chosen), "member length"
-        if self.distance.value and state.grid is not None:
-            values, members, nodes = (
-                deviation(chosen.grid, state.grid)[chosen.grid.edges].mean(axis=1),
-                chosen.grid.edges,
-                corners,
-            )
-            words = "distance from the present design"
-        colors, low, high = colors_of(values, None, self.ends)
-        legend = legend_of(f"{chosen.name}: {words}", chosen.grid.unit, low, high, False)
+        drawn, grid = drawn_design(chosen), chosen.grid
+        nodes, corners = (
+            frame.to_scene(each) + there for each in (drawn.model.nodes / drawn.unit_of_scan, grid.scan_nodes)
+        )
+        model, colors, legend = drawn.model, dict[str, np.ndarray](), None
+        members, triangles, panels = model.members, model.triangles, model.panels
+        if self.is_by_distance and state.grid is not None:
+            members, triangles, panels, nodes = grid.edges, grid.triangles, grid.panel_table, corners
+            colors["members"], low, high = colors_of(deviation(grid, state.grid)[members].mean(axis=1), None)
+            legend = legend_of(f"{chosen.name}: distance from the present design", grid.unit, low, high, False)
+        elif (scale := self.view.look.scale) is not None and len(scale.of_designs) > 1:
+            values = scale.of_designs[1]
+            colors[scale.choice["kind"]] = drawn_colors(scale.colors(values), self.view.look.selected(values))
+            legend = scale.legend(f"{chosen.name}: ") if self.is_over else None  # else the one of both
         self.view.legends.show("beside", legend)
-        scene.lines("/beside/members", nodes[members], colors)
-        scene.panels("/beside/panels", corners, chosen.grid.triangles, None, 0.25, chosen.grid.panel_table)
+        scene.lines("/beside/members", nodes[members], colors.get("members", PLAIN))
+        if "nodes" in colors:
+            size = 0.2 * frame.factor * float(grid.lengths.mean())
+            scene.points("/beside/nodes", nodes, np.ascontiguousarray(colors["nodes"]), size)
+        else:
+            scene.remove("/beside/nodes")
+        scene.panels("/beside/panels", nodes, triangles, colors.get("panels"), 0.25, panels)
         if self.is_over or state.grid is None:
             scene.remove("/beside/present")
             self._name(
@@ -131,20 +167,5 @@ class CompareTab:
         above = (float(low[0] + high[0]) / 2, float(high[1]), float(high[2]) + LABEL_ABOVE)
         self.view.scene.api.add_label(part, words, position=above, anchor="bottom-center", font_screen_scale=NAME_SIZE)
 
-    @property
-    def ends(self) -> tuple[float, float] | None:
-        """Ends of one scale of member lengths, of the present design and the one beside it [scan unit]; None where there is none."""
-        chosen, shown = self._chosen(self.view.session.state), self.view.shown_model()
-        if chosen is None or shown is None or self.distance.value:
-            return None
-        both = np.concatenate([lengths_of(chosen), shown[0].lengths / self.view.unit_of(shown[0])])
-        return float(both.min()), float(both.max())
-
     def _chosen(self, state: StudioState) -> Design | None:
         return next((each for each in state.designs if each.name == self.other.value), None)
-
-
-def lengths_of(design: Design) -> np.ndarray:
-    """Return the lengths of the members of a design that are drawn (M,) [scan unit]."""
-    nodes, members = drawn_members(design)
-    return np.asarray(np.linalg.norm(nodes[members[:, 1]] - nodes[members[:, 0]], axis=1))

@@ -6,10 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..export.page_tables import PageColumn, colorings_of
 from ..grid.panels import panel_of_triangles
 from .certificate_list import CertificateList
-from .colours import BRUSHED, DIMMED, colors_of, histogram_of, legend_of, legend_of_names, marked, rgb_of, values_of
+from .colouring import BY_LENGTH, PLAIN_GRID, DrawnDesign, SharedScale, choices_of
+from .colours import BRUSHED, DIMMED, histogram_of
 from .drawn_lines import numbers_of
 from .frame import SectionPlane
 from .legend import ColourLegend
@@ -36,7 +36,6 @@ if TYPE_CHECKING:
     from .state import StudioState
     from .view import StudioView
 
-PLAIN_GRID, BY_LENGTH, BY_SECTION = "plain", "member length", "section"
 WHOLE = "none"
 
 
@@ -46,7 +45,8 @@ class GridTab:
     def __init__(self, view: StudioView, gui: Any) -> None:
         self.view, step = view, view.step
         self._choices: dict[str, dict[str, Any]] = {}
-        self._values: np.ndarray | None = None
+        self._wanted = ""  # the colouring that was chosen last, or taken for new results
+        self.scale: SharedScale | None = None  #: of the present design and the one that is compared; None: plain
         self.coloring = gui.add_dropdown("grid", (PLAIN_GRID,))
         self.legend, self.bars = gui.add_html(""), gui.add_html("")
         self.range = gui.add_multi_slider(
@@ -68,7 +68,7 @@ class GridTab:
             each.on_update(step(self.draw))
         self.range.on_update(view.slid(self._slide))
         view.typed(self.between, self._brush)
-        self.coloring.on_update(step(lambda: self._chosen(view.session.state)))
+        self.coloring.on_update(step(self._choose))
         for each in (self.axis, self.at):
             each.on_update(step(lambda: view.scan.draw()))
             each.on_update(step(lambda: view.structure.draw()))
@@ -83,38 +83,44 @@ class GridTab:
         if before is not None and before.grid is state.grid and before.solution is state.solution:
             return
         self.view.select("", 0)
-        shown = self.view.shown_model()
-        tables = {} if shown is None else shown[1]
-        self._choices = {one["words"]: one for one in (colorings_of(tables) if shown is not None else [])}
-        if shown is not None and shown[0].truss is not None:
-            sections = sorted(shown[0].truss.sections, key=lambda one: one.area)
-            names = tuple(dict.fromkeys(one.name for one in sections))
-            self._choices[BY_SECTION] = {"kind": "members", "name": "section", "words": BY_SECTION, "names": names}
-        kept = self.coloring.value
-        self.coloring.options = (PLAIN_GRID, *self._choices)
-        best = next(iter(self._choices), PLAIN_GRID)
-        has_new_results = before is None or before.solution is not state.solution
-        self.coloring.value = (
-            kept if kept in self._choices and not (has_new_results and state.solution is not None) else best
-        )
-        self._chosen(state)
+        if before is None or (before.solution is not state.solution and state.solution is not None):
+            self._wanted = ""
+        self.choose_again()
 
-    def _chosen(self, state: StudioState) -> None:
+    @property
+    def present(self) -> DrawnDesign | None:
+        """The grid or structure that is drawn; None where there is none."""
+        shown = self.view.shown_model()
+        return None if shown is None else DrawnDesign(*shown, self.view.unit_of(shown[0]))
+
+    def choose_again(self) -> None:
+        """Offer the colourings that all that is drawn has, and take the one that was wanted, where it is among them."""
+        present, other = self.present, self.view.compare.drawn
+        of_present = choices_of([present] if present is not None else [])
+        if present is not None and self._wanted not in (*of_present, PLAIN_GRID):
+            self._wanted = next(iter(of_present), PLAIN_GRID)
+        both = [each for each in (present, other) if each is not None]
+        self._choices = of_present if present is None or other is None else choices_of(both)
+        self.coloring.options = (PLAIN_GRID, *self._choices)
+        is_there = present is None or self._wanted in self._choices or self._wanted == PLAIN_GRID
+        self.coloring.value = PLAIN_GRID if present is None else self._wanted if is_there else BY_LENGTH
+        self.view.compare.say_lack("" if is_there else self._wanted)
+        self._show_choice()
+
+    def _choose(self) -> None:
+        self._wanted = self.coloring.value
+        self._show_choice()
+
+    def _show_choice(self) -> None:
         """Take the colouring that was chosen: its values, legend and histogram."""
-        self._values = None
-        column = self._column()
-        self.range.visible = self.count.visible = self.between.visible = column is not None
-        if column is None:
+        choice, present, other = self._choices.get(self.coloring.value), self.present, self.view.compare.drawn
+        self.scale = None
+        self.range.visible = self.count.visible = self.between.visible = choice is not None
+        if choice is None or present is None:
             self.legend.content = self.bars.content = ""
         else:
-            choice = self._choices[self.coloring.value]
-            names, middle = choice.get("names"), choice.get("middle")
-            values = (
-                values_of(column) if names is None else 1.0 + np.array([names.index(each) for each in column.values])
-            )
-            _, low, high = colors_of(values, middle)
-            self._values = values
-            begin, end, step = round_ends(low, high)
+            self.scale = SharedScale.of(choice, [present] if other is None else [present, other])
+            begin, end, step = round_ends(*self.scale.ends)
             set_scale(self.range, begin, end, step)
             self.range.value = begin, end
             self.view.show_text(self.between, "")
@@ -132,11 +138,11 @@ class GridTab:
         self.range.value = (low, high)
         self.draw()
 
-    def _column(self) -> PageColumn | None:
-        choice, shown = self._choices.get(self.coloring.value), self.view.shown_model()
-        if choice is None or shown is None:
-            return None
-        return next((one for one in shown[1][choice["kind"]] if one.name == choice["name"]), None)
+    def selected(self, values: np.ndarray) -> np.ndarray | None:
+        """Return which values (N,) lie in the range that was chosen; None where all do."""
+        assert self.scale is not None
+        (begin, end), (low, high) = self.range.value, self.scale.ends
+        return None if begin <= low and end >= high else (values >= begin) & (values <= end)
 
     @property
     def section(self) -> SectionPlane | None:
@@ -153,53 +159,35 @@ class GridTab:
         if shown is None:
             scene.remove(*GRID_PARTS)
             self.view.legends.show("grid", None)
+            self.view.compare.draw()
             return
         model, _ = shown
         places = self.view.places(model)
         legend: ColourLegend | None = None
         colors: dict[str, np.ndarray | None] = {"members": None, "nodes": None, "panels": None}
-        if self._values is not None:
-            choice = self._choices[self.coloring.value]
-            middle, unit = choice.get("middle"), getattr(self._column(), "unit", "")
-            _, low, high = colors_of(self._values, middle)
-            scale_ends = self.view.compare.ends if choice["words"] == BY_LENGTH else None
-            if scale_ends is not None:
-                scale_ends = (scale_ends[0] * self.view.unit_of(model), scale_ends[1] * self.view.unit_of(model))
-            most, too_much = choice.get("most", (np.inf, ""))
-            if high > most:
-                scale_ends = (min(low, most), most)
-            own, *shown_ends = colors_of(self._values, middle, scale_ends)
-            own = marked(own, self._values, most, too_much)
-            legend = legend_of(self.coloring.value, unit, shown_ends[0], shown_ends[1], middle is not None)
-            if high > most:
-                legend = legend.with_mark(rgb_of(too_much), f"more than {most:g}")
-            if "names" in choice:
-                legend = legend_of_names(choice["words"], choice["names"], self._values)
+        is_reference = self.view.compare.is_by_distance
+        if (scale := self.scale) is not None:
+            values, kind = scale.of_designs[0], scale.choice["kind"]
+            legend, selected = scale.legend(), self.selected(values)
             self.legend.content = legend.html()
-            begin, end = self.range.value
-            is_whole = begin <= low and end >= high
-            scale = shown_ends[0], shown_ends[1]
-            self.bars.content = histogram_of(
-                self._values,
-                low,
-                high,
-                lambda values: marked(colors_of(values, middle, scale)[0], values, most, too_much),
-                None if is_whole else (begin, end),
-            )
-            selected = None if is_whole else (self._values >= begin) & (self._values <= end)
-            colors[choice["kind"]] = drawn_colors(own, selected)
+            chosen = None if selected is None else self.range.value
+            self.bars.content = histogram_of(values, *scale.ends, scale.colors, chosen)
+            if not (is_reference or self.view.compare.is_over):
+                colors[kind] = drawn_colors(scale.colors(values), selected)
             said = "" if selected is None else f"{int(selected.sum()):,} of "
-            self.count.content = f"{said}{len(self._values):,} {choice['kind']}"
+            self.count.content = f"{said}{len(values):,} {kind}"
         section, size = self.section, float(np.linalg.norm(np.diff(places[model.members], axis=1), axis=2).mean())
         of_members = plain_colors(len(model.members)) if colors["members"] is None else colors["members"]
         is_faint = self.view.structure.is_moved or self.view.compare.is_over
-        self.view.legends.show("grid", None if is_faint else legend)
+        self.view.legends.show("grid", None if is_faint or is_reference else legend)
         if self.view.structure.is_moved:
             of_members = np.broadcast_to(DIMMED, of_members.shape)
             self.count.content = "grey as built, while the Structure tab shows a displaced shape"
         elif self.view.compare.is_over:
             of_members = np.broadcast_to(DIMMED, of_members.shape)
             self.count.content = "grey, while Compare draws another design over it"
+        elif is_reference:
+            self.count.content = "plain, while Compare colours another design by its distance from this one"
         ends, of_members = cut(section, places[model.members], of_members)
         lines, bodies = self.members.value and not self.tubes.value, self.members.value and self.tubes.value
         as_rods = lines and not for_picture and drawn_as_rods(model, len(ends))
@@ -237,6 +225,7 @@ class GridTab:
             0.35 if len(model.members) <= MOST_DRAWN_LINES or is_layered(model) else None,
             panels[visible],
         )
+        self.view.compare.draw()
 
     # ---- theme
 

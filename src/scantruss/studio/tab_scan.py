@@ -5,10 +5,14 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
+from ..grid.upward import guessed_up
 from ..settings import UNITS
 from .clean_tool import CleanTool
 from .colours import CLASS_NAMES, MOST_CLASSES, OWN_COLORS, SCAN_COLOURINGS, colorings_of_scan
 from .crop_tool import CropTool
+from .left_out import words_left_out, words_on_page
 from .opening import EXAMPLES
 from .remove_tool import RemoveTool
 from .scan_parts import UP_AXES
@@ -35,13 +39,14 @@ class ScanTab:
             by_path = gui.add_button("Open the path")
             self.example = gui.add_dropdown("example", tuple(EXAMPLES))
             opened = gui.add_button("Open the example")
-        self.about = gui.add_markdown("")
+        self.about, self.left_out = gui.add_markdown(""), gui.add_markdown("", visible=False)
         self.unit = gui.add_dropdown("unit", tuple(name or UNKNOWN_UNIT for name in UNITS), initial_value=UNKNOWN_UNIT)
         self.up = gui.add_dropdown(
             "up",
             tuple(UP_AXES),
             hint="axis of the file that points up: of a scan that lies on its side, y or x; what was placed goes",
         )
+        self.seems = gui.add_markdown("", visible=False)
         self.draws = gui.add_checkbox("draw scan", True)
         self.coloring = gui.add_dropdown("colour", SCAN_COLOURINGS)
         with gui.add_folder("Crop", expand_by_default=False):
@@ -77,6 +82,14 @@ class ScanTab:
             of_all = f" of {whole:,}" if whole != len(cloud.points) else ""
             self.about.content = f"**{cloud.name or 'scan'}**: {len(cloud.points):,}{of_all} points, {cloud.extent:.4g}{unit} long{saved}"
             self.unit.value = cloud.unit or UNKNOWN_UNIT
+        if before is None or before.cloud is not cloud or before.grid is not state.grid:
+            lines = words_left_out(state)
+            self.left_out.content, self.left_out.visible = words_on_page(lines), bool(lines)
+            seems = axis_that_seems_up(state)
+            self.seems.content, self.seems.visible = (
+                f"its shape tells that **{seems}** is up; choose that here",
+                bool(seems),
+            )
         self.up.value = "z" if state.whole is None else state.whole.up
         if before is None or before.whole is not state.whole or before.settings.classes != state.settings.classes:
             self._fill_classes(state)
@@ -124,3 +137,12 @@ class ScanTab:
             self.view.legends.show("scan", None)
             return
         self.view.legends.show("scan", self.view.scene.scan(state, self.coloring.value, self.view.look.section))
+
+
+def axis_that_seems_up(state: StudioState) -> str:
+    """Return the axis of the file that the shape of the grid tells is up, where it is not the one that was chosen; else ""."""
+    if state.grid is None or not (guess := guessed_up(state.grid, state.cloud)):
+        return ""
+    axis = (-1 if guess.startswith("-") else 1) * np.eye(3)["xyz".index(guess[-1])]
+    in_file = axis @ np.array(UP_AXES["z" if state.whole is None else state.whole.up], float)
+    return next(name for name, rows in UP_AXES.items() if np.allclose(rows[2], in_file))

@@ -9,16 +9,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import InputError
+from ..errors import InputError, words_of_number
 from ..structure.build import scale_of
 from ..structure.groups import WAYS_TO_GROUP
 from ..structure.options import loads_of_words
-from ..structure.report_lines import sizing_lines
+from ..structure.report_lines import node_lines, sizing_lines
 from ..structure.supports import HELD
 from .colours import colors_of, legend_of
 from .compare import structure_figures
 from .frame import DRAWN_EXTENT
 from .layers_tool import LAYER_CHOICES, LayersTool
+from .legend import ColourLegend
 from .outputs import PREVIEW_WORDS
 from .page_words import in_words_of_page
 from .picking import nearest_point
@@ -36,7 +37,10 @@ SHOWN_DISPLACEMENT = 0.06  #: of the greatest displacement, as it is drawn first
 LOAD_ARROW = 0.08  #: of the greatest load [extent of the scan]
 SUPPORT_COLOR = np.array((20, 130, 60), np.uint8)
 LOAD_COLOR = np.array((235, 120, 10), np.uint8)
-MOST_ARROWS = 160  #: of loads, spread over the structure
+MOST_ARROWS = (
+    160  #: of loads, for more hide the members; where more nodes are loaded, as many of them, far from one another
+)
+NO_LOAD = 1e-9  #: share of the greatest load of a node up to which another has none
 ARROW_WIDTH = 2.0  #: of a load [pixel]
 SUPPORT_RADIUS = 0.09  #: of a support that is drawn [scene]
 ANIMATION_SECONDS, FRAME_SECONDS = 6.0, 0.08  #: of a mode that is shown [s]
@@ -257,6 +261,7 @@ class StructureTab:
         rows = [f"**before the last change**, {words_of_asked(state)}:"] if state.is_structure_stale else []
         rows += [f"{name} **{value}**" for name, value in structure_figures(state)]
         if state.report is not None:
+            rows += [in_words_of_page(words) for words in node_lines(state.report.truss)]
             rows += sizing_lines(state.report)
             rows += [f"**warning:** {in_words_of_page(words)}" for words in state.report.warnings]
         self.results.content = "\n\n".join(rows)
@@ -294,6 +299,7 @@ class StructureTab:
         if shown is None or state.solution is None or shown[0].truss is None:
             scene.remove("/moved", "/loads")
             self.view.legends.show("shape", None)
+            self.view.legends.show("loads", None)
             return
         model, _ = shown
         places = self.view.places(model)
@@ -330,6 +336,7 @@ class StructureTab:
         case = next((each for each in cases if each.name == self.case.value), cases[-1] if cases else None)
         if case is None or not self.loads.value:
             self.view.scene.remove("/loads")
+            self.view.legends.show("loads", None)
             return
         truss, forces = state.solution.truss, np.zeros((len(places), 3))
         if case.nodal is not None:
@@ -339,10 +346,12 @@ class StructureTab:
             for side in (0, 1):
                 np.add.at(forces, truss.members[:, side], half)
         size = np.linalg.norm(forces, axis=1)
-        strong = np.flatnonzero((size > 0.02 * size.max()) & self._kept(places))
-        drawn = strong[spread(places[strong], MOST_ARROWS)]
-        along = forces[drawn] * (LOAD_ARROW * DRAWN_EXTENT / (size.max() or 1.0))
+        greatest = float(size.max(initial=0.0))
+        loaded = np.flatnonzero((size > NO_LOAD * greatest) & self._kept(places))
+        drawn = loaded[spread(places[loaded], MOST_ARROWS)]
+        along = forces[drawn] * (LOAD_ARROW * DRAWN_EXTENT / (greatest or 1.0))
         self.view.scene.lines("/loads", barbed(places[drawn], along), LOAD_COLOR, ARROW_WIDTH)
+        self.view.legends.show("loads", legend_of_loads(case.name, greatest, len(drawn), len(loaded)))
 
     def _animate(self) -> None:
         state, shown = self.view.session.state, self.view.shown_model()
@@ -365,3 +374,13 @@ class StructureTab:
                 handle.points = (places + swing * step)[members]
             time.sleep(FRAME_SECONDS)
         self._draw(state)
+
+
+def legend_of_loads(case: str, greatest: float, drawn: int, loaded: int) -> ColourLegend | None:
+    """Return the legend of the arrows of a load case: the greatest load of a node [N], and how many of the loaded nodes have one."""
+    if not loaded:
+        return None
+    where = f"all {loaded:,}" if drawn == loaded else f"{drawn:,} of {loaded:,}"
+    red, green, blue = LOAD_COLOR.tolist()
+    said = f"{case}, at most {words_of_number(greatest / 1e3, 3)} kN, on {where} loaded nodes{'' if drawn == loaded else ', evenly spread'}"
+    return ColourLegend("loads", marks=(((red, green, blue), said),))

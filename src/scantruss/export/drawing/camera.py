@@ -7,15 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...grid.upward import OPEN_SHELL, facing_of, likely_upward
 from .style import angles_of
 
 EYE_DISTANCE = 3.4  #: of the eye from the middle, in radii of the grid; a mild perspective
-OPEN_SHELL = 0.5  # length of the mean normal by area above which a shell is open: it faces one way on the whole
-LEAST_FACING = 0.08  # length of the mean normal by area above which it decides which way is up if no flat face does
-FACE_DEPTH = 0.02  # how flat the face is on which something stands [longest side]
-FLAT_FACE = 0.1  # least share of such a face in the plan
-UPRIGHT = 3.0  # how much more a face counts that is below in a file with y or z up
-POLYGON_DIRECTIONS = 64  # directions in which a convex polygon is sought
 ANGLES = {  # azimuth and elevation of the views of a drawing [degree]
     "top": (0.0, 90.0), "bottom": (0.0, -90.0), "front": (0.0, 0.0), "back": (180.0, 0.0),
     "left": (-90.0, 0.0), "right": (90.0, 0.0),
@@ -97,63 +92,6 @@ def choose_camera(
     right = np.cross(ground, front)
     right /= np.linalg.norm(right)
     return Camera(np.zeros(3), right, np.cross(back, right), back, ground, 1.0).around(nodes)
-
-
-def facing_of(nodes: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Return the mean normal of a surface by area (3,): the shorter, the more closed it is."""
-    a, b, c = nodes[triangles.T]
-    normal = np.cross(b - a, c - a)
-    facing: np.ndarray = normal.sum(axis=0) / (float(np.linalg.norm(normal, axis=1).sum()) or 1.0)
-    return facing
-
-
-def likely_upward(nodes: np.ndarray, facing: np.ndarray) -> np.ndarray:
-    """Return the direction that is probably up (3,), where gravity is not known: an object lies on its largest flat face.
-
-    An open shell stands on its opening. An object without a flat face stands along its longest side, or lies if it is flat.
-    """
-    openness = float(np.linalg.norm(facing))
-    if openness > OPEN_SHELL:
-        return _upward(facing / openness)
-    extent = np.ptp(nodes, axis=0)
-    faces = {}
-    for axis in range(3):
-        across = np.delete(nodes, axis, axis=1)
-        whole = float(np.prod(np.ptp(across, axis=0))) or 1.0
-        for sign in (1.0, -1.0):
-            height = sign * nodes[:, axis]
-            down = height <= height.min() + FACE_DEPTH * extent.max()
-            usual = UPRIGHT if sign > 0.0 and axis in (1, 2) else 1.0  # most files have y or z up
-            faces[axis, sign] = (usual * _area_around(across[down]), _area_around(across[down]) / whole)
-    (axis, sign), (_, share) = max(faces.items(), key=lambda item: item[1][0])
-    if share > FLAT_FACE:
-        return sign * np.eye(3)[axis]
-    return _upward(facing / openness) if openness > LEAST_FACING else _standing(extent)
-
-
-def _area_around(flat: np.ndarray) -> float:
-    """Return about the area of the smallest convex polygon around points (N, 2)."""
-    if len(flat) < 3:
-        return 0.0
-    turn = np.linspace(0.0, 2.0 * np.pi, POLYGON_DIRECTIONS, endpoint=False)
-    rays = np.stack([np.cos(turn), np.sin(turn)])
-    corner = flat[(flat @ rays).argmax(axis=0)]
-    after = np.roll(corner, -1, axis=0)
-    return float(0.5 * abs((corner[:, 0] * after[:, 1] - corner[:, 1] * after[:, 0]).sum()))
-
-
-def _upward(facing: np.ndarray) -> np.ndarray:
-    """Return the direction itself, or the axis it is nearly along."""
-    axis = int(np.argmax(np.abs(facing)))
-    return np.eye(3)[axis] * np.sign(facing[axis]) if abs(facing[axis]) > math.cos(math.radians(25)) else facing
-
-
-def _standing(extent: np.ndarray) -> np.ndarray:
-    """Return the axis along which something without a flat face stands."""
-    short, middle, long = np.argsort(extent, kind="stable")
-    if extent[long] > 1.15 * extent[middle]:
-        return np.eye(3)[long]
-    return np.eye(3)[short] if extent[short] < 0.5 * extent[middle] else np.eye(3)[1]
 
 
 def _is_lying(nodes: np.ndarray, ground: np.ndarray) -> bool:

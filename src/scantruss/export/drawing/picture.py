@@ -15,10 +15,11 @@ import numpy as np
 
 from ...errors import words_of_number
 from ...grid.grid import Grid
+from ...grid.upward import known_upward
 from ...runtime.files import write_files
 from ...runtime.ours import MARK
 from ...runtime.places import check_place
-from ...scan.cloud import SURVEY_UNITS, PointCloud
+from ...scan.cloud import PointCloud
 from .camera import Camera, choose_camera
 from .left_out import Shown, shown_points
 from .legend import FAULT, Legend, Ring, Row, Text, marks_of, scale_bar
@@ -45,7 +46,6 @@ if TYPE_CHECKING:
 
 PICTURE_SIZE = (1600, 1200)  #: of a picture [pixel]
 PANELS_SIZE = (2400, 800)  #: of three panels, or of several views [pixel]
-UP = np.array([0.0, 0.0, 1.0])  # against gravity
 
 
 def encode_picture(
@@ -107,12 +107,6 @@ def plot_grid(grid: Grid, cloud: PointCloud | None, views: tuple[str, ...], size
     from PIL.Image import open as open_image
 
     return open_image(io.BytesIO(encode_picture(grid, cloud, style=PictureStyle(views=views, size=size))))
-
-
-def known_upward(grid: Grid, cloud: PointCloud | None) -> np.ndarray | None:
-    """Return the direction against gravity (3,) if unit or file give it: scans of buildings and terrain have z up."""
-    known = grid.unit in SURVEY_UNITS or (cloud is not None and cloud.z_is_up)
-    return UP if known else None
 
 
 def _rings(grid: Grid, camera: Camera, em: float, texts: list[Text]) -> list[Ring]:

@@ -11,9 +11,8 @@ import numpy as np
 from ...runtime.ours import MARK
 from .strokes import INK, PAPER
 
-PICTURE = (560, 391)  #: of one of them [pixel]
+PICTURE = (560, 420)  #: of one of them, all of which is shown [pixel]
 TITLE = 60  # above each [pixel]
-SHOWN = 0.93  # of its height; the caption below is too small here
 PICTURES_IN_A_ROW = 4  # in a row
 
 
@@ -31,8 +30,7 @@ def encode_sheet(pictures: Sequence[tuple[str, bytes]]) -> bytes:
     for number, (title, png) in enumerate(pictures):
         x, y = number % columns * PICTURE[0], tall - (number // columns) * (PICTURE[1] + TITLE) - TITLE
         with Image.open(io.BytesIO(png)) as image:
-            part = (0, 0, image.width, round(SHOWN * image.height))
-            small = image.convert("RGB").resize(PICTURE, Image.Resampling.LANCZOS, box=part)
+            small = image.convert("RGB").resize(PICTURE, Image.Resampling.LANCZOS)
         figure.figimage(np.asarray(small), x, y - PICTURE[1], origin="upper")
         figure.text(
             (x + PICTURE[0] / 2) / wide,

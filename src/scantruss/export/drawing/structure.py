@@ -10,10 +10,10 @@ from typing import Any, cast
 
 import numpy as np
 
+from ...grid.upward import AGAINST_GRAVITY
 from ...runtime.ours import MARK
 from ...structure.truss import Truss
 from .camera import choose_camera
-from .picture import UP
 from .strokes import INK, PAPER, look
 
 FORCES, USED, MOVED, SIZES = "forces", "utilization", "displacements", "sizes"  #: scales of colours
@@ -133,7 +133,7 @@ def draw_members(figure: Any, place: tuple[float, float, float, float], truss: T
     axes = figure.add_axes((left, bottom, width * 0.88, height), xlim=(0, size[0]), ylim=(0, size[1]))
     axes.set_axis_off()
     nodes = truss.nodes if shown.moves is None else truss.nodes + shown.factor * shown.moves
-    camera = choose_camera(truss.nodes, truss.triangles, UP)
+    camera = choose_camera(truss.nodes, truss.triangles, AGAINST_GRAVITY)
     margin = 0.03 * size[0]
     box = (margin, margin + NOTES, size[0] - margin, size[1] - margin)
     camera = camera.framed(np.concatenate([truss.nodes, nodes]), box)

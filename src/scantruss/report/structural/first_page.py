@@ -121,7 +121,12 @@ def _assumptions(truss: Truss, settings: StructureSettings, stability: bool) -> 
     held = int(truss.supports.any(axis=1).sum())
     yield f"{held:,} supports, {settings.support_type}: {support_words(settings.supports)}."
     loads = [load_words(load) for load in settings.loads]
-    yield f"Loads: {'; '.join(loads)}. {100 * settings.node_allowance:g} % of the weight of the members is added for the nodes."
+    nodes = (
+        f"{100 * settings.node_allowance:g} % of the weight of the members is added for the nodes"
+        if settings.node_allowance
+        else "the weight of the nodes, as of balls, is not counted"
+    )
+    yield f"Loads: {'; '.join(loads)}; {nodes}."
     given = "those of EN 1990" if settings.combinations is None else "those of the settings file"
     yield f"Combinations: {given}, {len(truss.combinations)} of them."
     yield (
