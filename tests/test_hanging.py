@@ -49,7 +49,7 @@ def test_a_node_at_the_foot_of_a_column_is_a_fault_though_points_are_near_its_me
     assert not any(fault.kind == "hanging" for fault in certify(grid, samples, NOTHING, SETTINGS).faults)
 
 
-def test_a_node_some_way_down_a_column_is_a_warning_but_none_on_a_bent_sheet() -> None:
+def test_a_node_some_way_down_a_column_is_a_fault_too_but_none_on_a_bent_sheet() -> None:
     turn, height = np.random.default_rng(3).uniform([[0.0], [-1.0]], [[2.0 * np.pi], [0.0]], (2, 300))
     column = np.column_stack([0.1 * np.cos(turn), 0.1 * np.sin(turn), height])
     samples, grid = scanned(np.concatenate([ROOF, column]), lattice())
@@ -58,8 +58,8 @@ def test_a_node_some_way_down_a_column_is_a_warning_but_none_on_a_bent_sheet() -
     nodes[down, 2] -= 0.4
     found = certify(grid.replace(nodes=nodes), samples, NOTHING, SETTINGS)
     assert not any(fault.kind == "hanging" for fault in found.faults)
-    (warning,) = (warning for warning in found.warnings if warning.kind == "off sheet")
-    assert known(warning.where) == pytest.approx((0.0, 0.0, -0.4), abs=1e-9)
+    (fault,) = (fault for fault in found.faults if fault.kind == "off sheet")
+    assert known(fault.where) == pytest.approx((0.0, 0.0, -0.4), abs=1e-9)
     assert not nodes_off_sheets(grid, samples, 1.0)
     for radius in (0.7, 1.0, 1.5, 2.5):  # spheres bent ever less, and the tip of each
         at, points = lattice().nodes, ROOF.copy()

@@ -18,6 +18,7 @@ from .settings import SAMPLE_SPACING
 from .surface.chosen_samples import ROD
 from .surface.samples import sample_surface
 from .surface.sharp_edges import EDGE_SHARE, FEWEST_NEEDED
+from .surface.supports import are_columns
 
 if TYPE_CHECKING:
     from .scan.cloud import PointCloud
@@ -189,12 +190,14 @@ def _has_rods(cloud: PointCloud, settings: Settings) -> bool:
 
 
 def _stands_on_rods(cloud: PointCloud, settings: Settings) -> bool:
-    """Whether the scan falls apart without such parts, as a hall does into its roof and its floor, or is rough for them alone."""
+    """Whether the scan falls apart without such parts, as a hall does, or is rough for them alone, or they are columns of a shell."""
     cut, without = sample_surface(cloud, settings), sample_surface(cloud, settings.replace(keep_rods=False))
     if not (without.judged == ROD).any():
         return False
     parts = [len(each.pieces) + len(each.not_chosen) for each in (cut, without)]
-    return parts[1] > parts[0] or (cut.rough > VERY_ROUGH_SCAN and without.rough <= ROUGH_SCAN)
+    if parts[1] > parts[0] or (cut.rough > VERY_ROUGH_SCAN and without.rough <= ROUGH_SCAN):
+        return True
+    return cloud.z_is_up and are_columns(without.scan[without.judged == ROD], without.surface.mean, settings.length)
 
 
 def _smoothed(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:

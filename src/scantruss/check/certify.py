@@ -100,7 +100,7 @@ class Judged:
         missed_at = place_of(samples.scan[_missed(found, followed, members)] + samples.origin)
         rough = samples.moved  # then its roughness is the scatter
         feet = feet_on(grid, samples, found, length)
-        offsets, (gaps, bridged), doubtful, aside, beyond, beside, apart, off_sheets, bare, peaks = side_by_side(
+        offsets, (gaps, bridged), doubtful, aside, beyond, beside, apart, bare, peaks = side_by_side(
             lambda: _offsets(grid, samples, length),
             lambda: bridged_gaps(grid, samples, boundary, length),
             lambda: [] if settings.boundary else doubtful_places(grid, samples, length),
@@ -108,7 +108,6 @@ class Judged:
             lambda: boundary_beyond(grid, samples, boundary, length),
             lambda: [] if rough else _beside(grid, samples, found, followed, members),
             lambda: cut_apart(grid, samples, found, length),
-            lambda: nodes_off_sheets(grid, samples, length),
             lambda: mostly_bare(grid, samples, feet, length),
             lambda: [] if rough else rounded_peaks(grid, samples, found, followed, members),
         )
@@ -127,7 +126,6 @@ class Judged:
             warnings=(
                 *self.certificate.warnings,
                 *apart,
-                *off_sheets,
                 *(each for each in bridged if each.kind == "gap"),
                 *narrow,
                 *lids,
@@ -163,6 +161,7 @@ def judge(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings: Set
         *too_far,
         *faults_on_sheets(grid, samples, nearest),
         *hanging_nodes(grid, samples, found, length),
+        *nodes_off_sheets(grid, samples, length),
         *_mostly_unfollowed(grid, samples, found, length),
     )
     faults += [fault for fault in further if fault.kind not in known]

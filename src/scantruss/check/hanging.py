@@ -48,7 +48,7 @@ def hanging_nodes(grid: Grid, samples: SurfaceSamples, found: Distances, length:
 
 
 def nodes_off_sheets(grid: Grid, samples: SurfaceSamples, length: float) -> list[Fault]:
-    """Return a warning where nodes stand off an even sheet but not so far that they hang, with their places; parameters as there."""
+    """Return a fault where nodes stand off an even sheet but not so far that they hang, with their places; parameters as there."""
     desired = np.full(len(grid.nodes), length) if grid.desired is None else grid.desired
     hanging = _spikes(grid, samples, desired, STEEP, EVEN)
     nodes = np.setdiff1d(_spikes(grid, samples, desired, LESS_STEEP, EVEN_FLAT), hanging)

@@ -14,6 +14,8 @@ OFF_FLOOR = 0.3  # height above the floor from which on a sample is none of it [
 FLOOR_HALF_THICKNESS = 0.1  # half the thickness of a floor [member lengths]
 LEAST_FLOOR_SHARE = 0.05  # least share of the samples in a floor
 WIDEST_SUPPORT = 1.3  # widest support in plan [member lengths]; the girth of a limb that can carry a grid is three
+MOST_UNDER = 0.3  # share of the samples of a shell that lie under others of it, at most: of a closed body half do
+LEAST_SLENDER = 1.5  # height of a column, least [widths]
 MOST_SUPPORTED = 0.2  # share of the samples from which on they are no supports but the shell
 
 
@@ -37,6 +39,22 @@ def support_samples(found: Linked, length: float) -> np.ndarray:
         own = which[group == each]
         support[own] = np.ptp(mean[own, :2], axis=0).max() <= WIDEST_SUPPORT * length
     return support if support.mean() <= MOST_SUPPORTED else none
+
+
+def are_columns(rods: np.ndarray, shell: np.ndarray, length: float) -> bool:
+    """Whether most points (N, 3) of rods are of columns, upright and slender, of a shell by its samples (S, 3), of which few lie under it.
+
+    Under a body that is closed half of it lies: its rods are limbs.
+    """
+    under = shell[:, 2] < _highest_around(shell, CELL_WIDTH * length) - LEAST_HEADROOM * length
+    if under.mean() > MOST_UNDER:
+        return False
+    group, upright = _beside_each_other(rods[:, :2], CELL_WIDTH * length), 0
+    for each in np.unique(group):
+        own = rods[group == each]
+        width, height = np.ptp(own[:, :2], axis=0).max(), np.ptp(own[:, 2])
+        upright += len(own) * bool(width <= WIDEST_SUPPORT * length and height >= LEAST_SLENDER * width)
+    return 2 * upright > len(rods)
 
 
 def _highest_around(mean: np.ndarray, cell: float) -> np.ndarray:
