@@ -95,6 +95,18 @@ def test_thin_spots_of_a_sparse_sheet_are_no_rods(seed: int) -> None:
     assert not any(rods_of(points, share * low).any() for share in (1.0, 1.1, 1.2, 1.4, 1.6))
 
 
+@pytest.mark.parametrize("length", [12.0, 18.0, 25.0])
+def test_a_sparse_part_of_a_sheet_is_no_scaffold(length: float) -> None:
+    """The face of a head with a thirtieth of the points of its hair: it left as columns, a fifth of the surface."""
+    rng = np.random.default_rng(4)
+    head = rng.normal(0.0, 1.0, (40_000, 3))
+    head /= np.linalg.norm(head, axis=1)[:, None]
+    head = head[(head[:, 0] < 0.55) | (rng.random(len(head)) < 0.03)]
+    cloud = st.PointCloud.from_array(100.0 * head * (1.0, 0.85, 1.25) + rng.normal(0.0, 0.15, head.shape))
+    samples = sample_surface(cloud, st.Settings(length=length, keep_rods=False))
+    assert (samples.judged == ROD).mean() < 0.0002
+
+
 def test_a_hall_gets_grids_of_roof_and_floor_and_the_columns_are_told(hall: tuple[np.ndarray, np.ndarray]) -> None:
     points, column = hall
     grid = st.grid_from_points(points, st.Settings(length=LENGTH, effort="quick"))
