@@ -116,6 +116,25 @@ def test_a_hall_gets_grids_of_roof_and_floor_and_the_columns_are_told(hall: tupl
     assert any(warning.kind == "left out" for warning in known(grid.certificate).warnings)
 
 
+def test_the_edge_of_a_roof_does_not_run_down_its_columns() -> None:
+    """A part of a torus on six columns near its edges, without a floor: the grid went down to their feet, with seven warnings."""
+    rng = np.random.default_rng(2411)
+    turn, slope = rng.uniform(0, np.radians(110), 20_000), rng.uniform(np.radians(20), np.radians(160), 20_000)
+    radius = 25 + 8 * np.cos(slope)
+    parts = [np.column_stack([radius * np.cos(turn), radius * np.sin(turn), 8 * np.sin(slope) + 3])]
+    for turned in np.radians([15, 55, 95]):
+        for at in np.radians([40, 140]):
+            away = 25 + 8 * np.cos(at)
+            parts.append(
+                pole(rng, away * np.cos(turned), away * np.sin(turned), 0.0, 8 * np.sin(at) + 3, radius=0.3, count=500)
+            )
+    points = np.concatenate(parts) + rng.normal(0.0, 0.004, (23_000, 3))
+    grid = st.grid_from_points(points, st.Settings(length=5.0, effort="quick"))
+    assert not known(grid.settings).keep_rods
+    assert grid.nodes[:, 2].min() + grid.origin[2] > 5.5
+    assert {warning.kind for warning in known(grid.certificate).warnings} == {"left out"}
+
+
 @pytest.mark.parametrize(("reason", "words"), [(ROD, "where a column"), (KEPT, "shorter members leave it open")])
 def test_a_place_that_was_closed_under_a_column_is_no_opening(reason: int, words: str) -> None:
     """Shorter members do not open it."""

@@ -7,6 +7,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, TypeGuard
 
+import numpy as np
+
 from .boundary.find import find_boundary
 from .cells.make import settings_of_triangles
 from .check.crossings import MOST_CROSSINGS
@@ -20,6 +22,7 @@ from .surface.samples import sample_surface
 from .surface.sharp_edges import EDGE_SHARE, FEWEST_NEEDED
 
 if TYPE_CHECKING:
+    from .grid.grid import Grid
     from .scan.cloud import PointCloud
     from .settings import Settings
 
@@ -36,6 +39,7 @@ COARSEST_SAMPLES = 0.5  # largest of them, in desired lengths
 FAR_FROM_PASSING = 12  # cuts and missing boundary loops above which other fronts with the same samples do not help
 # share of the scan that a grid misses above which other fronts do not help either, in shares that may be missing; of thin limbs 1
 FAR_MISSING = 2.0
+BESIDE_RODS = 0.5  # distance from a rod within which the place of a warning is beside it [member lengths]
 MOST_RUNS = 24  # grids that are made at most, before a scan is refused
 MOST_RUNS_OF_CELLS = 3  # grids of quads or hexagons that are made at most; they are made of triangles that pass
 MOST_FAR, MOST_GIVEN_UP = 2, 3  # attempts in a row of the same settings that are so far from passing, and such settings
@@ -138,6 +142,27 @@ def attempts(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:
             if size <= COARSEST_SAMPLES:
                 yield from _same_scan(settings.replace(box_size=size))
         yield from _same_scan(settings.replace(method="paper"))
+
+
+def runs_along_rods(grid: Grid, cloud: PointCloud, settings: Settings) -> bool:
+    """Whether a grid that passes leaves the boundary or the sheet of its scan beside rods, as where its edge runs down a column."""
+    found = grid.certificate
+    if not settings.keep_rods or settings.method != "default" or found is None:
+        return False
+    places = [
+        place
+        for warning in found.warnings
+        if warning.kind in ("aside", "off sheet")
+        for place in (warning.where, *warning.also)
+        if place is not None
+    ]
+    if not places:
+        return False
+    samples = sample_surface(cloud, settings.replace(keep_rods=False))
+    rods = samples.scan[samples.judged == ROD] + samples.origin
+    return bool(len(rods)) and any(
+        bool((np.linalg.norm(rods - place, axis=1) < BESIDE_RODS * settings.length).any()) for place in places
+    )
 
 
 def only_leaves_out(fault: ScanTrussError) -> TypeGuard[CertificateError]:
