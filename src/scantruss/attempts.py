@@ -11,6 +11,7 @@ import numpy as np
 
 from .boundary.find import find_boundary
 from .cells.make import settings_of_triangles
+from .check.certify import MOST_ACCEPTED
 from .check.crossings import MOST_CROSSINGS
 from .constraints.find import ridges_away_from
 from .constraints.ridges import find_ridges
@@ -82,7 +83,7 @@ class Attempt:
             return ""
         found = fault.grid.certificate
         allowing = f"--allow-missing {math.ceil(100.0 * found.missing) / 100.0:g}"
-        if self.settings.smooth_scale:
+        if self.settings.smooth_scale and found.missing <= MOST_ACCEPTED:
             smooth = f"--smooth-scale {self.settings.smooth_scale:g} --ridge-angle 0"
             return f"with {smooth} {allowing} a grid of its mean surface passes"
         if self.settings.plain_body and found.missing <= FAR_MISSING * self.settings.allow_missing:

@@ -188,7 +188,10 @@ def grid_with_notes(
         except FrontError as error:
             note_layers(bars, cloud, settings)
             note_pieces(bars, cloud, settings)
-            words = f"{error}{nearby_words(bars, cloud, settings, advice)}"
+            from .floors import words_of_floor
+
+            lead = words_of_floor(bars, cloud, settings) or nearby_words(bars, cloud, settings, advice)
+            words = f"{error}{lead}"
             raise type(error)(words, error.grid, error.where) from None
     made = grid.settings or settings
     smoothed = made.smooth_scale != settings.smooth_scale

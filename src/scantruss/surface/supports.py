@@ -14,6 +14,7 @@ OFF_FLOOR = 0.3  # height above the floor from which on a sample is none of it [
 FLOOR_HALF_THICKNESS = 0.1  # half the thickness of a floor [member lengths]
 LEAST_FLOOR_SHARE = 0.05  # least share of the samples in a floor
 WIDEST_SUPPORT = 1.3  # widest support in plan [member lengths]; the girth of a limb that can carry a grid is three
+MOST_BELOW_FLOOR = 0.01  # share of the samples that may lie below a floor
 MOST_SUPPORTED = 0.2  # share of the samples from which on they are no supports but the shell
 
 
@@ -26,7 +27,7 @@ def support_samples(found: Linked, length: float) -> np.ndarray:
     length : desired member length [scan unit]
     """
     mean, none = found.mean, np.zeros(len(found.mean), np.bool_)
-    under = mean[:, 2] < _highest_around(mean, CELL_WIDTH * length) - LEAST_HEADROOM * length
+    under = _under_shell(mean, length)
     if (floor := _floor_height(mean[under, 2], FLOOR_HALF_THICKNESS * length, LEAST_FLOOR_SHARE * len(mean))) is None:
         return none
     between = under & (mean[:, 2] > floor + OFF_FLOOR * length)
@@ -37,6 +38,27 @@ def support_samples(found: Linked, length: float) -> np.ndarray:
         own = which[group == each]
         support[own] = np.ptp(mean[own, :2], axis=0).max() <= WIDEST_SUPPORT * length
     return support if support.mean() <= MOST_SUPPORTED else none
+
+
+def floor_below(mean: np.ndarray, length: float) -> float | None:
+    """Return the height of the level floor under a shell, joined to it or not, below which hardly anything lies; None if there is none.
+
+    Parameters
+    ----------
+    mean : (S, 3) positions of the samples, z upwards [scan unit]
+    length : desired member length [scan unit]
+    """
+    half, heights = FLOOR_HALF_THICKNESS * length, mean[_under_shell(mean, length), 2]
+    if (layer := _floor_height(heights, half, LEAST_FLOOR_SHARE * len(mean))) is None:
+        return None
+    floor = float(np.median(heights[np.abs(heights - layer) <= half]))
+    return floor if (mean[:, 2] < floor - half).mean() < MOST_BELOW_FLOOR else None
+
+
+def _under_shell(mean: np.ndarray, length: float) -> np.ndarray:
+    """Return which samples (S,) bool lie under others (S, 3)."""
+    under: np.ndarray = mean[:, 2] < _highest_around(mean, CELL_WIDTH * length) - LEAST_HEADROOM * length
+    return under
 
 
 def _highest_around(mean: np.ndarray, cell: float) -> np.ndarray:
