@@ -245,6 +245,19 @@ def test_a_sparse_fringe_along_an_edge_is_left_out() -> None:
     assert outliers.find_outliers(points, 3.0)[len(x) :].mean() >= 0.9
 
 
+@pytest.mark.parametrize("density", [0.015, 0.02, 0.03])
+def test_a_sparse_corner_of_a_roof_is_no_stray(density: float) -> None:
+    """A sixth of a roof with a fiftieth of the points of the rest left as outliers, and the grid passed without a word."""
+    rng = np.random.default_rng(3)
+    x, y = rng.uniform(-12, 12, (2, 40_000))
+    sparse = (x > 2) & (y > 2)
+    kept = ~sparse | (rng.random(len(x)) < density)
+    points = np.column_stack([x, y, 5 - 0.02 * x * x - 0.015 * y * y])[kept]
+    points += rng.normal(0, 0.004, points.shape)
+    outlier = outliers.find_outliers(points, 3.0)
+    assert outlier[sparse[kept]].mean() <= 0.2 and outlier[~sparse[kept]].mean() <= 0.001
+
+
 def test_a_sparse_wall_beside_a_dense_one_is_no_stray() -> None:
     """A vessel whose inner wall has a tenth of the points of the outer one, a little more than its own spacing away."""
     rng = np.random.default_rng(1)

@@ -95,6 +95,18 @@ def test_thin_spots_of_a_sparse_sheet_are_no_rods(seed: int) -> None:
     assert not any(rods_of(points, share * low).any() for share in (1.0, 1.1, 1.2, 1.4, 1.6))
 
 
+@pytest.mark.parametrize("length", [12.0, 18.0, 25.0])
+def test_a_sparse_part_of_a_sheet_is_no_scaffold(length: float) -> None:
+    """The face of a head with a thirtieth of the points of its hair: it left as columns, a fifth of the surface."""
+    rng = np.random.default_rng(4)
+    head = rng.normal(0.0, 1.0, (40_000, 3))
+    head /= np.linalg.norm(head, axis=1)[:, None]
+    head = head[(head[:, 0] < 0.55) | (rng.random(len(head)) < 0.03)]
+    cloud = st.PointCloud.from_array(100.0 * head * (1.0, 0.85, 1.25) + rng.normal(0.0, 0.15, head.shape))
+    samples = sample_surface(cloud, st.Settings(length=length, keep_rods=False))
+    assert (samples.judged == ROD).mean() < 0.0002
+
+
 def test_a_hall_gets_grids_of_roof_and_floor_and_the_columns_are_told(hall: tuple[np.ndarray, np.ndarray]) -> None:
     points, column = hall
     grid = st.grid_from_points(points, st.Settings(length=LENGTH, effort="quick"))
@@ -102,6 +114,25 @@ def test_a_hall_gets_grids_of_roof_and_floor_and_the_columns_are_told(hall: tupl
     (part,) = (part for part in known(grid.certificate).left_out if part.kind == "rods")
     assert 0.8 * column.sum() < part.points < 1.1 * column.sum() and not part.asked
     assert any(warning.kind == "left out" for warning in known(grid.certificate).warnings)
+
+
+def test_the_edge_of_a_roof_does_not_run_down_its_columns() -> None:
+    """A part of a torus on six columns near its edges, without a floor: the grid went down to their feet, with seven warnings."""
+    rng = np.random.default_rng(2411)
+    turn, slope = rng.uniform(0, np.radians(110), 20_000), rng.uniform(np.radians(20), np.radians(160), 20_000)
+    radius = 25 + 8 * np.cos(slope)
+    parts = [np.column_stack([radius * np.cos(turn), radius * np.sin(turn), 8 * np.sin(slope) + 3])]
+    for turned in np.radians([15, 55, 95]):
+        for at in np.radians([40, 140]):
+            away = 25 + 8 * np.cos(at)
+            parts.append(
+                pole(rng, away * np.cos(turned), away * np.sin(turned), 0.0, 8 * np.sin(at) + 3, radius=0.3, count=500)
+            )
+    points = np.concatenate(parts) + rng.normal(0.0, 0.004, (23_000, 3))
+    grid = st.grid_from_points(points, st.Settings(length=5.0, effort="quick"))
+    assert not known(grid.settings).keep_rods
+    assert grid.nodes[:, 2].min() + grid.origin[2] > 5.5
+    assert {warning.kind for warning in known(grid.certificate).warnings} == {"left out"}
 
 
 @pytest.mark.parametrize(("reason", "words"), [(ROD, "where a column"), (KEPT, "shorter members leave it open")])

@@ -7,8 +7,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, TypeGuard
 
+import numpy as np
+
 from .boundary.find import find_boundary
 from .cells.make import settings_of_triangles
+from .check.certify import MOST_ACCEPTED
 from .check.crossings import MOST_CROSSINGS
 from .constraints.find import ridges_away_from
 from .constraints.ridges import find_ridges
@@ -21,6 +24,7 @@ from .surface.sharp_edges import EDGE_SHARE, FEWEST_NEEDED
 from .surface.supports import are_columns
 
 if TYPE_CHECKING:
+    from .grid.grid import Grid
     from .scan.cloud import PointCloud
     from .settings import Settings
 
@@ -37,6 +41,7 @@ COARSEST_SAMPLES = 0.5  # largest of them, in desired lengths
 FAR_FROM_PASSING = 12  # cuts and missing boundary loops above which other fronts with the same samples do not help
 # share of the scan that a grid misses above which other fronts do not help either, in shares that may be missing; of thin limbs 1
 FAR_MISSING = 2.0
+BESIDE_RODS = 0.5  # distance from a rod within which the place of a warning is beside it [member lengths]
 MOST_RUNS = 24  # grids that are made at most, before a scan is refused
 MOST_RUNS_OF_CELLS = 3  # grids of quads or hexagons that are made at most; they are made of triangles that pass
 MOST_FAR, MOST_GIVEN_UP = 2, 3  # attempts in a row of the same settings that are so far from passing, and such settings
@@ -79,7 +84,7 @@ class Attempt:
             return ""
         found = fault.grid.certificate
         allowing = f"--allow-missing {math.ceil(100.0 * found.missing) / 100.0:g}"
-        if self.settings.smooth_scale:
+        if self.settings.smooth_scale and found.missing <= MOST_ACCEPTED:
             smooth = f"--smooth-scale {self.settings.smooth_scale:g} --ridge-angle 0"
             return f"with {smooth} {allowing} a grid of its mean surface passes"
         if self.settings.plain_body and found.missing <= FAR_MISSING * self.settings.allow_missing:
@@ -139,6 +144,27 @@ def attempts(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:
             if size <= COARSEST_SAMPLES:
                 yield from _same_scan(settings.replace(box_size=size))
         yield from _same_scan(settings.replace(method="paper"))
+
+
+def runs_along_rods(grid: Grid, cloud: PointCloud, settings: Settings) -> bool:
+    """Whether a grid that passes leaves the boundary of its scan beside rods, as where its edge runs down a column."""
+    found = grid.certificate
+    if not settings.keep_rods or settings.method != "default" or found is None:
+        return False
+    places = [
+        place
+        for warning in found.warnings
+        if warning.kind == "aside"
+        for place in (warning.where, *warning.also)
+        if place is not None
+    ]
+    if not places:
+        return False
+    samples = sample_surface(cloud, settings.replace(keep_rods=False))
+    rods = samples.scan[samples.judged == ROD] + samples.origin
+    return bool(len(rods)) and any(
+        bool((np.linalg.norm(rods - place, axis=1) < BESIDE_RODS * settings.length).any()) for place in places
+    )
 
 
 def only_leaves_out(fault: ScanTrussError) -> TypeGuard[CertificateError]:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 
 import numpy as np
 
-from .attempts import Attempt, AttemptLimit, attempts, joins_sheets, only_leaves_out
+from .attempts import Attempt, AttemptLimit, attempts, joins_sheets, only_leaves_out, runs_along_rods
 from .boundary.find import find_boundary
 from .candidates import advance_fronts, best_that_passes, improve_fronts
 from .cells.make import certified_cells, settings_of_triangles, with_cells
@@ -230,7 +231,8 @@ def first_that_passes(
         if not limit.allows(attempt):
             continue
         try:
-            return make_grid_with_most_ridges(cloud, attempt, limit, progress=progress)
+            grid = make_grid_with_most_ridges(cloud, attempt, limit, progress=progress)
+            return without_rods_if_better(grid, cloud, attempt, limit, progress=progress)
         except ScanTrussError as error:
             looks_one_sided = bool(faults) and isinstance(faults[0], OneSidedError)  # where its mean surface does not
             if attempt.settings == settings:  # what goes wrong with other settings, nobody has asked for
@@ -249,6 +251,21 @@ def first_that_passes(
     if advice and isinstance(worst, FrontError) and not only_leaves_out(worst):
         raise type(worst)(f"{worst}; {advice}", worst.grid, worst.where)
     raise worst
+
+
+def without_rods_if_better(
+    grid: Grid, cloud: PointCloud, attempt: Attempt, limit: AttemptLimit, *, progress: Progress | None = None
+) -> Grid:
+    """Return a grid that passes, or, where it runs along columns or scaffold, one without these if that has fewer warnings."""
+    if not runs_along_rods(grid, cloud, attempt.settings):
+        return grid
+    without = replace(attempt, settings=attempt.settings.replace(keep_rods=False))
+    try:
+        other = make_grid_with_most_ridges(cloud, without, limit, progress=progress)
+    except ScanTrussError:
+        return grid
+    assert grid.certificate is not None and other.certificate is not None
+    return other if len(other.certificate.warnings) < len(grid.certificate.warnings) else grid
 
 
 def make_grid_with_most_ridges(

@@ -29,6 +29,7 @@ from .left_out import closed_holes, first_and_more, parts_left_out
 from .limits import NOISES_OFF, ROUNDED_BY, limits_of, places_to_look_at, widened_limits
 from .sheets import cut_apart, faults_on_sheets, nodes_of_samples
 from .slits import feet_on, narrow_gaps
+from .sparse import sparse_parts
 from .steps import unfollowed_steps
 from .unfollowed import mostly_unfollowed, rounded_peaks, unfollowed_parts
 
@@ -125,6 +126,7 @@ class Judged:
             faults=(*self.certificate.faults, *beyond, *bare, *(each for each in bridged if each.kind == "bridged")),
             warnings=(
                 *self.certificate.warnings,
+                *sparse_parts(samples, found, members),
                 *apart,
                 *(each for each in bridged if each.kind == "gap"),
                 *narrow,

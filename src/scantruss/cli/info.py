@@ -46,6 +46,7 @@ def info(values: Namespace) -> None:
     from ..report.terminal import Bars, print_lines, print_table
     from ..scan.member_length import check_length, length_range
     from ..surface.samples import sample_surface
+    from .floors import words_of_floor
     from .options import has_length, settings_of
 
     settings = settings_of(with_some_length(values))
@@ -64,6 +65,8 @@ def info(values: Namespace) -> None:
                 length = settings.length if has_length(values) else advice.suggest()
                 print_table(*advice_rows(advice, length, cloud))
                 print_lines(advice_lines(advice, length, cloud))
+                if not advice.passes and (words := words_of_floor(bars, cloud, settings.replace(length=length))):
+                    print_lines([words.removeprefix("; ")])
                 settings = advice.settings.replace(length=length)
             samples, boundary = find_boundary(sample_surface(cloud, settings), settings, progress=bars)
         note_outliers(bars, cloud, settings, "scantruss grid")

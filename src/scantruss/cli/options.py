@@ -26,6 +26,14 @@ class UsageError(InputError):
     """The command line cannot be understood."""
 
 
+#: what other programs call an option -> its name here
+WORDS_OF_OTHERS = {
+    "output": "out", "overwrite": "force", "f": "force", "l": "length", "mesh-size": "length", "edge-length": "length",
+    "quads": "cells", "quad": "cells", "hexagons": "cells", "hole-fill": "fill-holes",
+    "close-holes": "fill-holes", "units": "unit", "silent": "quiet", "layer": "class",
+}  # fmt: skip
+
+
 class Parser(argparse.ArgumentParser):
     """The parser of one command: plain one-line errors, options and files in any order, negative numbers as values."""
 
@@ -64,6 +72,7 @@ class Parser(argparse.ArgumentParser):
         known = {name.lstrip("-"): name for name in self._option_string_actions}  # dashes make all names alike
         close = get_close_matches(word.lstrip("-"), known, 1, 0.7)
         near = begin[0] if len(word) > 2 and begin else known[close[0]] if close else ""
+        near = near or known.get(WORDS_OF_OTHERS.get(word.lstrip("-"), "-"), "")
         return f" (did you mean {near}?)" if near else ""
 
 

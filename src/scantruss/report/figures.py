@@ -152,14 +152,16 @@ def line_lines(grid: Grid) -> list[str]:
 
 
 def first_line(certificate: Certificate) -> list[str]:
-    """Return what a user must know first: that ScanTruss, by its own judgement, left out much of the scan; else nothing."""
+    """Return what a user must know first: that ScanTruss, by its own judgement, left out much of the points or of the surface."""
+    sparse = [f"the grid {warning.words}" for warning in certificate.warnings if warning.kind == "sparse"]
     if certificate.judged_out <= WARN_LEFT_OUT:
-        return []
+        return sparse
     own = [part for part in certificate.left_out if part.points and not part.asked and part.kind != "duplicates"]
     kinds = dict.fromkeys(part.words for part in own)
     return [
         f"{certificate.judged_out:.1%} of the scan, {sum(part.points for part in own):,} of {certificate.points:,} points,"
-        f" is not in the grid: {'; '.join(kinds)}"
+        f" is not in the grid: {'; '.join(kinds)}",
+        *sparse,
     ]
 
 

@@ -56,6 +56,7 @@ def result_of(trial: LengthTrial | None) -> str:
         for words, share in sorted(shares.items(), key=lambda kind: -kind[1])[:MOST_WORDS]
         if share >= 0.0005
     ]
+    parts += [warning.words for warning in found.warnings if warning.kind == "sparse"]
     holes = sum(part.kind == "hole" for part in found.left_out)
     parts += [f"{holes} {'hole' if holes == 1 else 'holes'} closed"] * (holes > 0)
     return ", ".join(parts)

@@ -33,6 +33,9 @@ FLAT_ACROSS = 0.1  # largest variance across a strip, in that over its width; ha
 PLACES_OF_STRIP = 16  # places of a strip at which it is looked at, at most
 FILLED_ACROSS = 0.3  # least variance across the points around a place of a strip, in that along it; of half a disc 0.28
 LEVEL_WITH_SHEET = 0.87  # cosine of the angle between the normals of a strip and of the sheet that it continues
+# share of the samples of a rod that lie along a line on their own, not as ends of others, at least, where most are single points:
+# scaffolds and columns 0.5 to 1, a sparse sheet less than 0.1
+LEAST_ALONG_LINES = 0.3
 ROD_DISTANCE = 0.8  # distance from all sheets at which a rod stands at one place at least [member lengths]
 
 
@@ -59,6 +62,7 @@ def rod_points(found: Linked, points: int, length: float, supports: np.ndarray |
     spreads, _, count = _spreads(found, np.ones(len(found.mean), np.bool_), COARSE_REACH * length)
     tells = np.median(count) >= FEWEST_SAMPLES_AROUND  # of fewer samples around each a sheet may look thin too
     rod = known | (_thin(spreads) & tells)
+    along_line = rod.copy()
     if rod.any():  # then joints of a scaffold too, which are rods to all sides
         rod |= _thin(_spreads(found, ~rod, FINE_REACH * length)[0])
     for _ in range(END_ROUNDS if rod.any() else 0):
@@ -69,7 +73,7 @@ def rod_points(found: Linked, points: int, length: float, supports: np.ndarray |
         if not ends.any():
             break
         rod |= ends
-    rod &= _long_groups(found, rod, known, length)
+    rod &= _long_groups(found, rod, known, length) & ~_of_sparse_sheets(found, rod, along_line)
     rod &= ~_arms(found, rod, length)
     rod |= _behind_sheets(found, rod, length)
     if rod.mean() > MOST_RODS:
@@ -156,6 +160,21 @@ def _is_level(points: np.ndarray, place: np.ndarray, reach: float, normal: np.nd
         np.linalg.eigvalsh(np.cov(points[each], rowvar=False)) for each in inside if each.sum() >= SAMPLES_OF_SHEET
     ]
     return 2 * sum(bool(each[1] > FILLED_ACROSS * each[2]) for each in around) > len(some)
+
+
+def _of_sparse_sheets(found: Linked, rod: np.ndarray, along_line: np.ndarray) -> np.ndarray:
+    """Return which samples of rods (S,) bool are of a part of a sheet with so few points that it looks like many short lines.
+
+    along_line : (S,) bool, samples that lie along a line on their own
+    """
+    label = _groups_of(found, rod)
+    size = np.maximum(np.bincount(label[rod], minlength=len(rod)), 1)
+    single = np.bincount(found.owner[found.owner >= 0], minlength=len(rod)) <= 1
+    share_single = np.bincount(label[rod], single[rod], len(rod)) / size
+    share_along = np.bincount(label[rod], along_line[rod], len(rod)) / size
+    is_chance = (share_along < LEAST_ALONG_LINES) | (size < FEWEST_OF_STRAIGHT)
+    marked: np.ndarray = ((share_single > 0.5) & is_chance)[label]
+    return marked
 
 
 def _groups_of(found: Linked, rod: np.ndarray) -> np.ndarray:

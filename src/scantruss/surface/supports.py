@@ -16,6 +16,7 @@ LEAST_FLOOR_SHARE = 0.05  # least share of the samples in a floor
 WIDEST_SUPPORT = 1.3  # widest support in plan [member lengths]; the girth of a limb that can carry a grid is three
 MOST_UNDER = 0.3  # share of the samples of a shell that lie under others of it, at most: of a closed body half do
 LEAST_SLENDER = 1.5  # height of a column, least [widths]
+MOST_BELOW_FLOOR = 0.01  # share of the samples that may lie below a floor
 MOST_SUPPORTED = 0.2  # share of the samples from which on they are no supports but the shell
 
 
@@ -28,7 +29,7 @@ def support_samples(found: Linked, length: float) -> np.ndarray:
     length : desired member length [scan unit]
     """
     mean, none = found.mean, np.zeros(len(found.mean), np.bool_)
-    under = mean[:, 2] < _highest_around(mean, CELL_WIDTH * length) - LEAST_HEADROOM * length
+    under = _under_shell(mean, length)
     if (floor := _floor_height(mean[under, 2], FLOOR_HALF_THICKNESS * length, LEAST_FLOOR_SHARE * len(mean))) is None:
         return none
     between = under & (mean[:, 2] > floor + OFF_FLOOR * length)
@@ -46,8 +47,7 @@ def are_columns(rods: np.ndarray, shell: np.ndarray, length: float) -> bool:
 
     Under a body that is closed half of it lies: its rods are limbs.
     """
-    under = shell[:, 2] < _highest_around(shell, CELL_WIDTH * length) - LEAST_HEADROOM * length
-    if under.mean() > MOST_UNDER:
+    if _under_shell(shell, length).mean() > MOST_UNDER:
         return False
     group, upright = _beside_each_other(rods[:, :2], CELL_WIDTH * length), 0
     for each in np.unique(group):
@@ -55,6 +55,27 @@ def are_columns(rods: np.ndarray, shell: np.ndarray, length: float) -> bool:
         width, height = np.ptp(own[:, :2], axis=0).max(), np.ptp(own[:, 2])
         upright += len(own) * bool(width <= WIDEST_SUPPORT * length and height >= LEAST_SLENDER * width)
     return 2 * upright > len(rods)
+
+
+def floor_below(mean: np.ndarray, length: float) -> float | None:
+    """Return the height of the level floor under a shell, joined to it or not, below which hardly anything lies; None if there is none.
+
+    Parameters
+    ----------
+    mean : (S, 3) positions of the samples, z upwards [scan unit]
+    length : desired member length [scan unit]
+    """
+    half, heights = FLOOR_HALF_THICKNESS * length, mean[_under_shell(mean, length), 2]
+    if (layer := _floor_height(heights, half, LEAST_FLOOR_SHARE * len(mean))) is None:
+        return None
+    floor = float(np.median(heights[np.abs(heights - layer) <= half]))
+    return floor if (mean[:, 2] < floor - half).mean() < MOST_BELOW_FLOOR else None
+
+
+def _under_shell(mean: np.ndarray, length: float) -> np.ndarray:
+    """Return which samples (S,) bool lie under others (S, 3)."""
+    under: np.ndarray = mean[:, 2] < _highest_around(mean, CELL_WIDTH * length) - LEAST_HEADROOM * length
+    return under
 
 
 def _highest_around(mean: np.ndarray, cell: float) -> np.ndarray:

@@ -39,6 +39,8 @@ SMALLEST_PART = 8  # fewest doubted points that make a part of a sheet
 OPEN_EDGE = 0.05
 # fewest of these; most at a free edge, in square roots of their number: hardly more than three sides of a square
 MANY_OF_PART, EDGE_OF_COMPACT = 200, 3.3
+# the same of a part of fewer points, of which some lie so deep in it that it is no fringe: distance from the rest of the scan [reaches]
+SOME_OF_PART, EDGE_OF_CORNER, DEEP, SHARE_DEEP = 80, 1.55, 3.0, 0.2
 LONE_SHARE = 3e-4  # share of samples without neighbours above which outliers are sought
 ENOUGH_AROUND = 6  # neighbours with which a sample is not alone
 # distance between samples where no member length is given, and within which they have neighbours [spacings of the points]: as those
@@ -169,6 +171,14 @@ def _on_sheets(near: Nearby, alive: np.ndarray, reach: np.ndarray, doubted: np.n
     part = component_labels(len(doubted), one, beside[one, other])
     size, edges = np.bincount(part, on, len(doubted)), np.bincount(part, on & at_edge, len(doubted))
     compact = (size >= MANY_OF_PART) & (edges <= EDGE_OF_COMPACT * np.sqrt(size))
+    few = (size >= SOME_OF_PART) & ~compact & (edges <= EDGE_OF_CORNER * np.sqrt(size))
+    if few.any() and alive.any():
+        which, squares = np.flatnonzero(on & few[part]), np.empty(int((on & few[part]).sum()))
+        places = np.ascontiguousarray(near.tree.points[doubted[which]])
+        others = build_kd_tree(np.ascontiguousarray(near.tree.points[alive]))
+        nearest_of_places(others, places, 1, squares, np.empty(len(which), np.int64))
+        deep = np.sqrt(squares) > DEEP * reach[doubted[which]]
+        compact |= few & (np.bincount(part[which], deep, len(doubted)) >= SHARE_DEEP * size)
     found: np.ndarray = on & ((size >= SMALLEST_PART) & (edges <= OPEN_EDGE * size) | compact)[part]
     return found
 
