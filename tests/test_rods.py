@@ -104,7 +104,7 @@ def test_a_sparse_part_of_a_sheet_is_no_scaffold(length: float) -> None:
     head = head[(head[:, 0] < 0.55) | (rng.random(len(head)) < 0.03)]
     cloud = st.PointCloud.from_array(100.0 * head * (1.0, 0.85, 1.25) + rng.normal(0.0, 0.15, head.shape))
     samples = sample_surface(cloud, st.Settings(length=length, keep_rods=False))
-    assert (samples.judged == ROD).mean() < 0.0002
+    assert (samples.judged == ROD).mean() < 0.001  # the face has eight times as many
 
 
 def test_a_hall_gets_grids_of_roof_and_floor_and_the_columns_are_told(hall: tuple[np.ndarray, np.ndarray]) -> None:

@@ -36,6 +36,7 @@ LEVEL_WITH_SHEET = 0.87  # cosine of the angle between the normals of a strip an
 # share of the samples of a rod that lie along a line on their own, not as ends of others, at least, where most are single points:
 # scaffolds and columns 0.5 to 1, a sparse sheet less than 0.1
 LEAST_ALONG_LINES = 0.3
+SPARSE_WIDTH = 3.0  # width of a part of a sheet that is kept for that, least [member lengths]
 ROD_DISTANCE = 0.8  # distance from all sheets at which a rod stands at one place at least [member lengths]
 
 
@@ -73,7 +74,7 @@ def rod_points(found: Linked, points: int, length: float, supports: np.ndarray |
         if not ends.any():
             break
         rod |= ends
-    rod &= _long_groups(found, rod, known, length) & ~_of_sparse_sheets(found, rod, along_line)
+    rod &= _long_groups(found, rod, known, length) & ~_of_sparse_sheets(found, rod, along_line, length)
     rod &= ~_arms(found, rod, length)
     rod |= _behind_sheets(found, rod, length)
     if rod.mean() > MOST_RODS:
@@ -112,11 +113,7 @@ def _long_groups(found: Linked, rod: np.ndarray, known: np.ndarray, length: floa
     Others are corners of a sheet, or where it has few points.
     """
     label = _groups_of(found, rod)
-    order = np.argsort(label, kind="stable")
-    first = np.flatnonzero(np.diff(label[order], prepend=-1))
-    sizes = np.maximum.reduceat(found.mean[order], first) - np.minimum.reduceat(found.mean[order], first)
-    long = np.zeros(len(rod), np.bool_)
-    long[label[order[first]]] = sizes.max(axis=1) >= length
+    long = _sizes(found, label).max(axis=1) >= length
     off = np.zeros(len(rod), np.bool_)
     off[label[rod & (_moments(found, ~rod, ROD_DISTANCE * length)[2] == 0)]] = True
     long &= off
@@ -162,8 +159,10 @@ def _is_level(points: np.ndarray, place: np.ndarray, reach: float, normal: np.nd
     return 2 * sum(bool(each[1] > FILLED_ACROSS * each[2]) for each in around) > len(some)
 
 
-def _of_sparse_sheets(found: Linked, rod: np.ndarray, along_line: np.ndarray) -> np.ndarray:
+def _of_sparse_sheets(found: Linked, rod: np.ndarray, along_line: np.ndarray, length: float) -> np.ndarray:
     """Return which samples of rods (S,) bool are of a part of a sheet with so few points that it looks like many short lines.
+
+    Such a part is some members wide: little is lost of a smaller one.
 
     along_line : (S,) bool, samples that lie along a line on their own
     """
@@ -173,8 +172,20 @@ def _of_sparse_sheets(found: Linked, rod: np.ndarray, along_line: np.ndarray) ->
     share_single = np.bincount(label[rod], single[rod], len(rod)) / size
     share_along = np.bincount(label[rod], along_line[rod], len(rod)) / size
     is_chance = (share_along < LEAST_ALONG_LINES) | (size < FEWEST_OF_STRAIGHT)
-    marked: np.ndarray = ((share_single > 0.5) & is_chance)[label]
+    wide = np.sort(_sizes(found, label), axis=1)[:, 1] >= SPARSE_WIDTH * length
+    marked: np.ndarray = ((share_single > 0.5) & is_chance & wide)[label]
     return marked
+
+
+def _sizes(found: Linked, label: np.ndarray) -> np.ndarray:
+    """Return the sides (S, 3) of the box around each group, zero where a sample's number is none of a group."""
+    order = np.argsort(label, kind="stable")
+    first = np.flatnonzero(np.diff(label[order], prepend=-1))
+    sizes = np.zeros((len(label), 3))
+    sizes[label[order[first]]] = np.maximum.reduceat(found.mean[order], first) - np.minimum.reduceat(
+        found.mean[order], first
+    )
+    return sizes
 
 
 def _groups_of(found: Linked, rod: np.ndarray) -> np.ndarray:
