@@ -145,6 +145,6 @@ def check_kept(members: np.ndarray, triangles: np.ndarray, nodes: np.ndarray) ->
     if lost.any():
         x, y, z = nodes[members[lost][0]].mean(axis=0).tolist()
         raise FrontError(
-            "a line could not be kept as members of the grid; use a smaller length, or give the line more room",
+            "a line could not be kept as members of the grid; use a smaller length, give it more room, or, for a ridge, --ridge-angle 0",
             where=(x, y, z),
         )
