@@ -120,13 +120,20 @@ class Judged:
         bridged = [each for each in bridged if each.kind == "bridged" or not each.is_said_by(parts)]
         holes = [*closed, *first_and_more([*(gap for gap in gaps if gap not in parts), *slits])]
         lids = openings_closed(holes, [*bridged, *narrow], samples, length, grid.unit)
+        too_sparse, sparse = sparse_parts(samples, found, members, settings.allow_missing)
         return replace(
             self.certificate,
             left_out=(*self.certificate.left_out, *holes),
-            faults=(*self.certificate.faults, *beyond, *bare, *(each for each in bridged if each.kind == "bridged")),
+            faults=(
+                *self.certificate.faults,
+                *too_sparse,
+                *beyond,
+                *bare,
+                *(each for each in bridged if each.kind == "bridged"),
+            ),
             warnings=(
                 *self.certificate.warnings,
-                *sparse_parts(samples, found, members),
+                *sparse,
                 *apart,
                 *(each for each in bridged if each.kind == "gap"),
                 *narrow,
@@ -211,6 +218,8 @@ def _way_out(found: Certificate) -> str:
         return "choose the part that is wanted with --crop or --piece; --keep-failed gives it all the same"
     if kinds == {"unfollowed"}:
         return "shorter members follow it; --keep-failed gives it all the same"
+    if kinds == {"sparse"}:
+        return "longer members cover it, --allow-missing accepts more of the scan missing"
     if kinds <= {"beyond", "bridged"}:
         return "shorter members keep to it, --crop leaves out what lies beyond it; --keep-failed gives it all the same"
     if "hanging" in kinds:

@@ -19,18 +19,21 @@ CELLS_OF_SPARSE, ENOUGH_IN_CELL = (2.0, 3.0, 4.0, 6.0), 3.0
 FEWEST_IN_CELL = 2  # points in a cell that show surface: a single one may be anything
 
 
-def sparse_parts(samples: SurfaceSamples, found: Distances, members: np.ndarray) -> list[Fault]:
-    """Return a warning where points too far apart for the members lie on much of the surface; nothing where they do not.
+def sparse_parts(
+    samples: SurfaceSamples, found: Distances, members: np.ndarray, allowed: float
+) -> tuple[list[Fault], list[Fault]]:
+    """Return a fault where points too far apart for the members lie on more of the surface than may be missing; a warning of less.
 
     Surface is counted in cells: those with points in reach of the grid, and those where only points are that it leaves out.
 
     Parameters
     ----------
     members : (N,) desired member length at each point [scan unit]
+    allowed : share of the scan that may be missing
     """
     sparse = samples.judged == SPARSE_POINT
     if not sparse.any():
-        return []
+        return [], []
     covered = found.scan <= members
     gone = ~covered & (sparse | ((samples.judged == KEPT) & ~samples.elsewhere))
     which = np.flatnonzero(covered | gone)
@@ -42,11 +45,12 @@ def sparse_parts(samples: SurfaceSamples, found: Distances, members: np.ndarray)
             break
     share = left.sum() / (followed.sum() + left.sum())
     if share <= WARN_LEFT_OUT:
-        return []
+        return [], []
     points = samples.scan[which[left[number]]]
     middle = points[((points - np.median(points, axis=0)) ** 2).sum(axis=1).argmin()]
     words = f"leaves out at least {share:.0%} of the surface, where points are too far apart for members so short"
-    return [Fault("sparse", words, place_of(middle + samples.origin))]
+    said = [Fault("sparse", words, place_of(middle + samples.origin))]
+    return (said, []) if share > allowed else ([], said)
 
 
 def _cells(points: np.ndarray, width: float) -> np.ndarray:
