@@ -149,3 +149,17 @@ def test_waves_that_members_are_too_long_for_are_named_with_their_share(length: 
     warning = known(warning_of(points + rng.normal(0.0, 0.005, points.shape), length))
     share = float(warning.words.partition("scan: ")[2].partition("%")[0]) / 100.0
     assert warning.words.startswith("smooths out waves") and 0.3 <= share <= 0.55
+
+
+@compiled_only
+def test_where_panels_were_made_planar_that_is_the_first_reason() -> None:
+    """The nodes of planar quads leave a cambered leaf by a tenth of a member."""
+    rng = np.random.default_rng(5)
+    x, y = rng.uniform([-14.0, -7.0], [14.0, 7.0], (60_000, 2)).T
+    inside = abs(y) < 6.5 * np.cos(np.pi * x / 28.0) ** 0.8
+    x, y = x[inside], y[inside]
+    points = np.column_stack([x, y, 4.0 - 0.012 * x**2 - 0.05 * y**2 + 0.4 * np.sin(x / 4.0)])
+    settings = st.Settings(length=1.0, effort="quick", cells="quad", planar=True)
+    grid = grid_from_points(points + rng.normal(0.0, 0.004, points.shape), settings)
+    (warning,) = (each for each in known(grid.certificate).warnings if each.kind == "unfollowed")
+    assert "as panels were made planar" in warning.words

@@ -162,8 +162,12 @@ def _warning(grid: Grid, samples: SurfaceSamples, found: Distances, parts: list[
     unit, points = f" {grid.unit}" if grid.unit else "", sum(map(len, parts))
     worst = [int(own[found.scan[own].argmax()]) for own in parts]
     several = f"{len(parts)} parts of the scan, the largest" if len(parts) > 1 else "a part of the scan"
+    is_planar = grid.settings is not None and grid.settings.planar
+    why = (
+        "as panels were made planar, or for a beam or a rib" if is_planar else "such as a beam, a rib or a second layer"
+    )
     words = (
-        f"does not follow {several} {_size(parts[0], samples):.3g}{unit} long, such as a beam, a rib or a second layer:"
+        f"does not follow {several} {_size(parts[0], samples):.3g}{unit} long, {why}:"
         f" {points:,} points ({points / len(samples.scan):.1%}) lie up to {found.scan[worst].max():.3g}{unit} off"
     )
     at, *others = (place_of(place) for place in samples.scan[worst] + samples.origin)
