@@ -740,3 +740,20 @@ def test_a_stop_that_another_error_hides_is_still_a_stop(
     monkeypatch.setattr(sys.modules[main.__module__], "run", interrupted)
     assert main(["info", "scan.ply"]) == 143
     assert capsys.readouterr().err == "scantruss: stopped; nothing was written\n"
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        "structure a.json b.json --loads self --loads snow:1kN/m2",  # the weight of the members went without a word
+        "grid a.ply b.json --length 1 --length=2",
+        "grid a.ply b.json --length 1 --unit m --unit mm",
+        "families a.json b.json --tolerance 1% --tolerance 2%",
+        "schedule a.json b.xlsx --tube 60x3 --tube 60x4",
+    ],
+)
+def test_an_option_that_keeps_one_value_is_refused_if_it_is_given_twice(
+    words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(words.split()) == 2
+    assert "is given twice; give it once" in capsys.readouterr().err

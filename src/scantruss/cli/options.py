@@ -55,13 +55,27 @@ class Parser(argparse.ArgumentParser):
 
     def read(self, words: Sequence[str]) -> argparse.Namespace:
         """Return the values of the command line."""
-        values, rest = self.parse_known_intermixed_args(_join_negative(words))
+        words = _join_negative(words)
+        values, rest = self.parse_known_intermixed_args(words)
+        self._check_once(words)
         if rest:
             unknown = next((word for word in rest if word.startswith("-")), None)
             if unknown is None:
                 self.error(f"too many arguments: {' '.join(rest)}; put a pattern such as *.ply in quotes")
             self.error(f"unknown option {unknown.partition('=')[0]}{self._nearest(unknown)}")
         return values
+
+    def _check_once(self, words: Sequence[str]) -> None:
+        """Refuse an option that is given twice and keeps one value: the first would go without a word."""
+        seen: set[str] = set()
+        for word in words[: words.index("--")] if "--" in words else words:
+            name = word.partition("=")[0]
+            action = self._option_string_actions.get(name)
+            if action is None or type(action).__name__ != "_StoreAction":
+                continue
+            if action.dest in seen:
+                self.error(f"{name} is given twice; give it once, with commas between values where it takes several")
+            seen.add(action.dest)
 
     def _nearest(self, word: str) -> str:
         """Guess which option was meant: one with the same beginning, else the most similar one."""
