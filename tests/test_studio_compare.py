@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 from studio_dome import done, session_of_dome
 from studio_view import choose, view_of
 
@@ -76,3 +77,24 @@ def test_a_grid_that_comes_after_none_is_coloured(tmp_path: Path) -> None:
         assert view.look.coloring.value == "plain" and view.look.bars.content == ""
         session.undo()
         assert view.look.coloring.value == "members at a node" and titles(view) == ["members at a node"]
+
+
+def test_designs_in_other_units_share_a_scale_in_the_unit_of_the_present_one_or_none(tmp_path: Path) -> None:
+    """A design in metres stood in the colours of one in millimetres: its 0.9 m were 0.9 mm."""
+    session = session_of_dome(tmp_path, 6.0)
+    session.keep_design("metres")
+    grid = session.state.designs[0].grid
+    lengths = np.sort(grid.lengths)
+    for unit, factor in (("mm", 1000.0), ("", None)):
+        session.set_unit(unit)
+        done(session)
+        assert session.grid is not None and session.grid.unit == unit
+        with view_of(session) as view:
+            choose(view, view.compare.other, "metres")
+            scale = view.look.scale
+            if factor is None:
+                assert "member length" not in view.look.coloring.options
+                assert view.compare.lack.visible and "is in m: no member length" in view.compare.lack.content
+            else:
+                assert scale is not None and scale.unit == unit
+                assert np.sort(scale.of_designs[1]) == pytest.approx(factor * lengths, rel=1e-3)

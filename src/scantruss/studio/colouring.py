@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..export.page_tables import PageColumn, Tables, colorings_of
+from ..settings import UNITS
 from .colours import colors_of, legend_of, legend_of_names, marked, rgb_of, values_of
 
 if TYPE_CHECKING:
@@ -25,6 +26,7 @@ class DrawnDesign:
     model: Model
     tables: Tables
     unit_of_scan: float  #: one scan unit in that of the model
+    scan_unit: str
 
     def column(self, choice: dict[str, Any]) -> PageColumn:
         """Return the column of a colouring that it has."""
@@ -34,6 +36,13 @@ class DrawnDesign:
         """Return the values of a colouring that it has (N,), numbers from 1 of what has names."""
         column, names = self.column(choice), choice.get("names")
         return values_of(column) if names is None else 1.0 + np.array([names.index(each) for each in column.values])
+
+    def unit_in(self, choice: dict[str, Any], first: DrawnDesign) -> float | None:
+        """Return the unit of a colouring in that of another design, None if there is no ratio between them; lengths as drawn."""
+        if choice["words"] == BY_LENGTH:  # a structure has its own unit and scale
+            ratio = _ratio(self.scan_unit, first.scan_unit)
+            return None if ratio is None else ratio * first.unit_of_scan / self.unit_of_scan
+        return _ratio(self.column(choice).unit, first.column(choice).unit)
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,12 +55,9 @@ class SharedScale:
 
     @classmethod
     def of(cls, choice: dict[str, Any], designs: Sequence[DrawnDesign]) -> SharedScale:
-        """Return the scale of designs that all have a colouring; lengths are compared as drawn."""
+        """Return the scale of designs that all have a colouring, in the unit of the first."""
         first = designs[0]
-        is_of_model = choice["words"] == BY_LENGTH  # a structure has its own unit and scale
-        values = [
-            each.values(choice) * (first.unit_of_scan / each.unit_of_scan if is_of_model else 1.0) for each in designs
-        ]
+        values = [each.values(choice) * (each.unit_in(choice, first) or 1.0) for each in designs]
         return cls(choice, first.column(choice).unit, tuple(values))
 
     @property
@@ -86,12 +92,24 @@ class SharedScale:
 
 
 def choices_of(designs: Sequence[DrawnDesign]) -> dict[str, dict[str, Any]]:
-    """Return the colourings that all designs have, by their words."""
+    """Return the colourings that all designs have, in units that can be compared, by their words."""
     found = [{one["words"]: one for one in colorings_of(each.tables)} for each in designs]
-    choices = {words: one for words, one in found[0].items() if all(words in each for each in found)} if found else {}
+    choices = {
+        words: one
+        for words, one in (found[0].items() if found else ())
+        if all(words in each for each in found) and all(each.unit_in(one, designs[0]) is not None for each in designs)
+    }
     trusses = [each.model.truss for each in designs if each.model.truss is not None]
     if trusses and len(trusses) == len(designs):
         sections = sorted((one for truss in trusses for one in truss.sections), key=lambda one: one.area)
         names = tuple(dict.fromkeys(one.name for one in sections))
         choices[BY_SECTION] = {"kind": "members", "name": "section", "words": BY_SECTION, "names": names}
     return choices
+
+
+def _ratio(unit: str, other: str) -> float | None:
+    """Return a unit in another one; None if either is none of length and they are not the same."""
+    if unit == other:
+        return 1.0
+    metres, of_other = UNITS.get(unit), UNITS.get(other)
+    return metres / of_other if metres and of_other else None

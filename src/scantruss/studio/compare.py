@@ -66,7 +66,7 @@ def drawn_design(design: Design) -> DrawnDesign:
             model, unit_of_scan = model_of(grid), 1.0
         else:
             model, unit_of_scan = model_of(solution, report=report), scale_of(grid.unit or asked.unit, asked.scale)
-        _DRAWN[design] = DrawnDesign(model, tables_of(model, grid), unit_of_scan)
+        _DRAWN[design] = DrawnDesign(model, tables_of(model, grid), unit_of_scan, grid.unit)
     return _DRAWN[design]
 
 

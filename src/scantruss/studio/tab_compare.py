@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from .colouring import DrawnDesign
+from .colouring import PLAIN_GRID, DrawnDesign
 from .colours import PLAIN, colors_of, legend_of
 from .compare import comparison, deviation, drawn_design, kept_design
 from .frame import BESIDE_FIRST, DRAWN_EXTENT
@@ -69,8 +69,9 @@ class CompareTab:
     @property
     def is_by_distance(self) -> bool:
         """Whether a design is coloured by its distance from the present one, which is plain then."""
-        state = self.view.session.state
-        return bool(self.distance.value) and self._chosen(state) is not None and state.grid is not None
+        state, chosen = self.view.session.state, self._chosen(self.view.session.state)
+        is_measured = chosen is not None and state.grid is not None and chosen.grid.unit == state.grid.unit
+        return bool(self.distance.value) and is_measured
 
     @property
     def drawn(self) -> DrawnDesign | None:
@@ -83,10 +84,12 @@ class CompareTab:
         chosen, self.lack.visible = self._chosen(self.view.session.state), bool(wanted)
         if chosen is not None and wanted:
             has_none = drawn_design(chosen).model.truss is None and self.view.session.solution is not None
-            why = "has no structure: no" if has_none else "has no"
-            self.lack.content = (
-                f"**{chosen.name}** {why} {wanted}; both are coloured by {self.view.look.coloring.value}"
-            )
+            present, unit = self.view.look.present, chosen.grid.unit or "no unit"
+            is_other_unit = present is not None and present.scan_unit != chosen.grid.unit
+            why = f"is in {unit}: no" if is_other_unit else "has no structure: no" if has_none else "has no"
+            coloring = self.view.look.coloring.value
+            both = coloring if coloring == PLAIN_GRID else f"coloured by {coloring}"
+            self.lack.content = f"**{chosen.name}** {why} {wanted}; both are {both}"
 
     def _drop(self) -> None:
         if self.other.value != NO_OTHER:

@@ -90,8 +90,10 @@ class GridTab:
     @property
     def present(self) -> DrawnDesign | None:
         """The grid or structure that is drawn; None where there is none."""
-        shown = self.view.shown_model()
-        return None if shown is None else DrawnDesign(*shown, self.view.unit_of(shown[0]))
+        shown, grid = self.view.shown_model(), self.view.session.state.grid
+        if shown is None or grid is None:
+            return None
+        return DrawnDesign(*shown, self.view.unit_of(shown[0]), grid.unit)
 
     def choose_again(self) -> None:
         """Offer the colourings that all that is drawn has, and take the one that was wanted, where it is among them."""
@@ -103,7 +105,8 @@ class GridTab:
         self._choices = of_present if present is None or other is None else choices_of(both)
         self.coloring.options = (PLAIN_GRID, *self._choices)
         is_there = present is None or self._wanted in self._choices or self._wanted == PLAIN_GRID
-        self.coloring.value = PLAIN_GRID if present is None else self._wanted if is_there else BY_LENGTH
+        instead = BY_LENGTH if BY_LENGTH in self._choices else PLAIN_GRID
+        self.coloring.value = PLAIN_GRID if present is None else self._wanted if is_there else instead
         self.view.compare.say_lack("" if is_there else self._wanted)
         self._show_choice()
 
