@@ -86,8 +86,8 @@ def run() -> None:
     from scantruss.cli.main import main
 
     rng = np.random.default_rng(1)
-    x, y = rng.uniform(-10.0, 10.0, (2, 20_000))
-    x, y = np.compress(np.hypot(x - 2.0, y) > 3.0, [x, y], axis=1)  # a shell with a hole
+    x, y = rng.uniform(-10.0, 10.0, (2, 120_000))
+    x, y = np.compress(np.hypot(x - 2.0, y) > 3.0, [x, y], axis=1)  # a dense shell with a hole
     np.save("shell.npy", np.column_stack([x, y, (x * x + y * y) / -30.0 + rng.normal(0.0, 0.02, len(x))]))
     for command in COMMANDS:
         words = [word.format(**{name: demo.scan for name, demo in DEMOS.items()}) for word in command.split()]
