@@ -318,10 +318,10 @@ class Advice:
     def _nearer(self, passing: float, length: float) -> float:
         """Return the last of lengths that pass, in steps from one towards another, which is far away."""
         self._count_at(passing, TRIED_AROUND)
-        while abs(math.log(length / passing)) > math.log(NEXT_LENGTH):  # ends: each turn is one step nearer
-            trial = self.try_length(
-                self.next_above(passing) if passing < length else self.next_below(passing), FIRST_TWO
-            )
+        steps = int(abs(math.log(length / passing)) / math.log(NEXT_LENGTH))
+        for _ in range(steps):
+            following = self.next_above(passing) if passing < length else self.next_below(passing)
+            trial = self.try_length(following, FIRST_TWO)
             if trial is None or not trial.passed:
                 break
             passing = trial.length

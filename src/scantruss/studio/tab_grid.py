@@ -96,7 +96,7 @@ class GridTab:
         return DrawnDesign(*shown, self.view.unit_of(shown[0]), grid.unit)
 
     def choose_again(self) -> None:
-        """Offer the colourings that all that is drawn has, and take the one that was wanted, where it is among them."""
+        """List the colourings that all that is drawn has, and take the one that was wanted, where it is among them."""
         present, other = self.present, self.view.compare.drawn
         of_present = choices_of([present] if present is not None else [])
         if present is not None and self._wanted not in (*of_present, PLAIN_GRID):
