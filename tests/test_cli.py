@@ -495,6 +495,25 @@ def test_a_failed_grid_is_written_where_that_is_asked_for_and_says_so(
     assert known(st.read_grid("a.json").certificate).faults[0].kind == "uneven"
 
 
+@pytest.mark.parametrize("name", ["a.obj", "a.ply"])
+def test_a_drawing_of_a_failed_grid_is_not_used_unless_told(
+    failing: Path, capsys: pytest.CaptureFixture[str], name: str
+) -> None:
+    assert main(["grid", "scan.xyz", name, "--length", LENGTH, "--keep-failed"]) == 3
+    capsys.readouterr()
+    for words in (
+        f"print {name} b.stl --member-diameter 1 --node-diameter 2",
+        f"structure {name} b.json --scale 50",
+        f"schedule {name} b.xlsx",
+        f"setout {name} b.csv",
+        f"convert {name} b.dxf",
+    ):
+        line = refused(capsys, *words.split(), status=3)
+        assert f"{name} is of a grid that failed its certificate: it has members whose lengths are" in line
+        assert "--keep-failed uses it anyway" in line
+    assert main(["convert", name, "b.dxf", "--keep-failed"]) == 0
+
+
 def test_the_report_holds_every_figure(place: Path) -> None:
     assert main(["grid", "scan.xyz", "a.obj", "--length", LENGTH, "--report", "r.json"]) == 0
     report = json.loads((place / "r.json").read_text())

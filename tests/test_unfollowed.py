@@ -8,8 +8,11 @@ from marks import compiled_only
 from typed import known
 
 import scantruss as st
+from scantruss.boundary.find import find_boundary
+from scantruss.check.certify import certify
 from scantruss.grid.certificate import Fault
 from scantruss.pipeline import grid_from_points
+from scantruss.surface.samples import sample_surface
 
 SPRINGING = 0.4  # height of the foot of the dome over its centre [radii]
 
@@ -163,3 +166,32 @@ def test_where_panels_were_made_planar_that_is_the_first_reason() -> None:
     grid = grid_from_points(points + rng.normal(0.0, 0.004, points.shape), settings)
     (warning,) = (each for each in known(grid.certificate).warnings if each.kind == "unfollowed")
     assert "as panels were made planar" in warning.words
+
+
+@compiled_only
+def test_a_body_whose_lobes_are_narrower_than_the_members_is_refused_and_with_shorter_ones_it_passes() -> None:
+    points = lobed(np.random.default_rng(5), lobes=5, depth=0.35)
+    with pytest.raises(st.CertificateError, match=r"too coarse for the shape of the scan: 5\d\.\d% of its points"):
+        grid_from_points(points, st.Settings(length=0.7, effort="quick"))
+    assert known(grid_from_points(points, st.Settings(length=0.3, effort="quick")).certificate).passed
+
+
+@compiled_only
+def test_a_mean_surface_far_inside_its_scan_is_a_fault() -> None:
+    ball = lobed(np.random.default_rng(6), lobes=5, depth=0.0)
+    grid = grid_from_points(ball, st.Settings(length=0.5, effort="quick"))
+    settings = st.Settings(length=0.5, smooth_scale=0.5, ridge_angle=0.0)
+    samples, boundary = find_boundary(sample_surface(st.PointCloud.from_array(ball), settings), settings)
+    kinds = [
+        {fault.kind for fault in certify(grid.replace(nodes=size * grid.nodes), samples, boundary, settings).faults}
+        for size in (1.0, 0.75)
+    ]
+    assert "unfollowed" not in kinds[0] and "unfollowed" in kinds[1]
+
+
+def lobed(rng: np.random.Generator, lobes: int, depth: float) -> np.ndarray:
+    """A ball of radius 1 with lobes around it."""
+    way = rng.normal(size=(8_000, 3))
+    way /= np.linalg.norm(way, axis=1)[:, None]
+    turn, level = np.arctan2(way[:, 1], way[:, 0]), np.hypot(way[:, 0], way[:, 1])
+    return np.asarray(way * (1.0 + depth * np.cos(lobes * turn) * level**2)[:, None])

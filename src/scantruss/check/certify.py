@@ -31,7 +31,7 @@ from .sheets import cut_apart, faults_on_sheets, nodes_of_samples
 from .slits import feet_on, narrow_gaps
 from .sparse import sparse_parts
 from .steps import unfollowed_steps
-from .unfollowed import mostly_unfollowed, rounded_peaks, unfollowed_parts
+from .unfollowed import mostly_unfollowed, off_mean_surface, rounded_peaks, unfollowed_parts
 
 if TYPE_CHECKING:
     from ..boundary.find import Boundary
@@ -304,10 +304,9 @@ def _to_follow(samples: SurfaceSamples) -> np.ndarray:
 
 
 def _mostly_unfollowed(grid: Grid, samples: SurfaceSamples, found: Distances, length: float) -> list[Fault]:
-    """Return a fault where a grid follows less than half of its scan; of a rough one the roughness is scatter."""
-    if samples.moved:
-        return []
-    return mostly_unfollowed(grid, samples, found, _to_follow(samples), _desired_at_points(grid, found, length))
+    """Return a fault where a grid does not follow its scan; of a rough one the roughness is scatter."""
+    judged = off_mean_surface if samples.moved else mostly_unfollowed
+    return judged(grid, samples, found, _to_follow(samples), _desired_at_points(grid, found, length))
 
 
 def _beside(

@@ -135,6 +135,19 @@ def offsets_from_points(grid: Grid, samples: SurfaceSamples, length: float) -> t
     return bias, scatter
 
 
+def normals_of(grid: Grid) -> np.ndarray:
+    """Return the unit normals of the triangles (T, 3), zero where they have none."""
+    a, b, c = grid.nodes[grid.triangles.T]
+    normal: np.ndarray = np.cross(b - a, c - a)
+    return normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+
+
+def heights_over(grid: Grid, triangle: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return how high points (K, 3) are over the planes of some triangles (K,), outside positive, and the normals of these (K, 3)."""
+    normal = normals_of(grid)[triangle]
+    return ((points - grid.nodes[grid.triangles[triangle, 0]]) * normal).sum(axis=1), normal
+
+
 def _node_normals(grid: Grid) -> np.ndarray:
     """Return the unit normal of each node (V, 3), the mean of its triangles by their areas."""
     a, b, c = (grid.nodes[grid.triangles[:, k]] for k in range(3))

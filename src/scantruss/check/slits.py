@@ -12,7 +12,7 @@ from ..grid.certificate import Fault, LeftOut, place_of
 from ..kernels.mesh.coverage import nearest_distances
 from ..runtime.parallel import in_parts
 from ..surface.chosen_samples import KEPT
-from .distances import PLACES_MEASURED_PER_THREAD, boxes_of, is_over_holes
+from .distances import PLACES_MEASURED_PER_THREAD, boxes_of, heights_over, is_over_holes, normals_of
 from .left_out import points_together
 from .limits import PLACES_KEPT
 
@@ -131,19 +131,11 @@ def feet_on(grid: Grid, samples: SurfaceSamples, found: Distances, length: float
     near = np.flatnonzero((samples.judged == KEPT) & (found.scan <= 0.5 * length))
     if not len(near):
         return None
-    corner, normal = grid.nodes[grid.triangles[:, 0]], normals_of(grid)
     points, triangle = samples.scan[near], found.triangle[near]
-    height = ((points - corner[triangle]) * normal[triangle]).sum(axis=1)
-    points = np.ascontiguousarray(points - height[:, None] * normal[triangle])
+    height, normal = heights_over(grid, triangle, points)
+    points = np.ascontiguousarray(points - height[:, None] * normal)
     boxes = boxes_of(points, max(0.1 * length, 4.0 * samples.spacing))
     return FeetOnGrid(points, boxes, samples.spacing, np.bincount(triangle, minlength=len(grid.triangles)))
-
-
-def normals_of(grid: Grid) -> np.ndarray:
-    """Return the unit normals of the triangles (T, 3), zero where they have none."""
-    a, b, c = grid.nodes[grid.triangles.T]
-    normal: np.ndarray = np.cross(b - a, c - a)
-    return normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
 
 
 def _far_places(

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..grid.certificate import Fault, place_of
+from .distances import heights_over
 from .left_out import points_together
 from .limits import NOISES_OFF, PLACES_KEPT
-from .slits import normals_of
 
 if TYPE_CHECKING:
     from ..grid.grid import Grid
@@ -40,8 +40,7 @@ def unfollowed_steps(
     if not len(near):
         return []
     points, triangle, member = samples.scan[near], found.triangle[near], float(members[near].mean())
-    normal = normals_of(grid)[triangle]
-    height = ((points - grid.nodes[grid.triangles[triangle, 0]]) * normal).sum(axis=1)
+    height, normal = heights_over(grid, triangle, points)
     column = max(COLUMN[0] * samples.spacing, COLUMN[1] * member)
     least = max(STEP[0] * column, STEP[1] * member) + NOISES_OFF * float(np.median(found.noise))
     if np.abs(height).max() <= 0.5 * least:  # then no column is as high

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..grid.certificate import Fault, place_of
+from .distances import heights_over
 from .folds import fold_angles
 from .left_out import points_together
 from .limits import NOISES_OFF, PLACES_KEPT
@@ -28,6 +29,12 @@ WARN_SHARE = 0.01  # share of the points in such a part from which on it is said
 # the noise [member lengths]: as where one row of triangles runs along a bent strip; of two layers, followed by turns, it is half at most
 MOST_UNFOLLOWED, LEAST_OFF = 0.55, 0.05
 WARN_UNFOLLOWED = 0.3  # ... above which that is said: 0.30 to 0.48 on corrugated roofs, at most 0.26 on 200 grids that keep to their scans
+# ... and above which it is a fault where a twentieth of the points lie farther off than this: blocks, where a figure has a waist and a
+# neck; the waves of a roof that are smoothed out are lower [member lengths]
+FAR_UNFOLLOWED, TWENTIETH = 0.25, 0.95
+# share of the points on triangles that stand off the middle of their points by more than the second, above which a grid does not follow
+# the mean surface of its scan: a body smoothed away is smaller than the scan, folds that are lie on both sides [member lengths]
+MOST_OFF_MEAN, OFF_MEAN = 0.33, 0.2
 # distance from the grid, beyond the noise, from which on points are of a peak that it cuts off [member lengths], and how many these
 # are at least, in all and times as many as points of a line as long
 PEAK, FEWEST_OF_PEAK, WIDTH_OF_PEAK = 0.3, 12, 3.0
@@ -67,16 +74,39 @@ def unfollowed_parts(
 def mostly_unfollowed(
     grid: Grid, samples: SurfaceSamples, found: Distances, chosen: np.ndarray, members: np.ndarray
 ) -> list[Fault]:
-    """Return a fault where a grid follows less than half of the points that it is to follow; parameters as of `unfollowed_parts`."""
-    followed_to = np.maximum(_followed_to(grid), LEAST_OFF)
-    which = _off(samples, found, chosen, members, followed_to, MOST_UNFOLLOWED * int(chosen.sum()))
-    if len(which) <= MOST_UNFOLLOWED * chosen.sum():
+    """Return a fault where a grid follows less than half of the points that it is to follow, or too few and the others lie far off.
+
+    Parameters as of `unfollowed_parts`.
+    """
+    followed_to, count = np.maximum(_followed_to(grid), LEAST_OFF), int(chosen.sum())
+    which = _off(samples, found, chosen, members, followed_to, WARN_UNFOLLOWED * count)
+    if len(which) <= WARN_UNFOLLOWED * count:
         return []
     unit, worst = f" {grid.unit}" if grid.unit else "", int(which[found.scan[which].argmax()])
-    words = (
-        f"follows less than half of the scan: {len(which) / chosen.sum():.1%} of its points lie up to"
-        f" {found.scan[worst]:.3g}{unit} off"
-    )
+    off = f"{len(which) / count:.1%} of its points lie up to {found.scan[worst]:.3g}{unit} off"
+    where = place_of(samples.scan[worst] + samples.origin)
+    if len(which) > MOST_UNFOLLOWED * count:
+        return [Fault("unfollowed", f"follows less than half of the scan: {off}", where)]
+    far, noise = float(np.quantile(found.scan[chosen] / members[chosen], TWENTIETH)), float(np.median(found.noise))
+    if far <= FAR_UNFOLLOWED + noise / float(members.max()):
+        return []
+    words = f"is too coarse for the shape of the scan: {off}, one in twenty by more than {far:.2f} members"
+    return [Fault("unfollowed", words, where)]
+
+
+def off_mean_surface(
+    grid: Grid, samples: SurfaceSamples, found: Distances, chosen: np.ndarray, members: np.ndarray
+) -> list[Fault]:
+    """Return a fault where the mean surface of a rough scan is not followed either; parameters as of `unfollowed_parts`."""
+    triangle, member = found.triangle[chosen], members[chosen]
+    height = heights_over(grid, triangle, samples.scan[chosen])[0] / member
+    count = np.maximum(np.bincount(triangle, minlength=len(grid.triangles)), 1)
+    middle = np.abs(np.bincount(triangle, height, minlength=len(grid.triangles)) / count)[triangle]
+    share = float(np.mean(middle > OFF_MEAN)) if len(middle) else 0.0
+    if share <= MOST_OFF_MEAN:
+        return []
+    worst = int(np.flatnonzero(chosen)[(middle * member).argmax()])
+    words = f"is too coarse for the shape of the scan: {share:.1%} of its points lie where that is {OFF_MEAN:g} members off or more"
     return [Fault("unfollowed", words, place_of(samples.scan[worst] + samples.origin))]
 
 

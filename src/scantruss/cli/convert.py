@@ -6,7 +6,7 @@ from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from .grids import add_grid
+from .grids import add_grid, check_drawing_passed
 from .outputs import Taken, claim, outs_of
 
 if TYPE_CHECKING:
@@ -81,6 +81,7 @@ def convert(values: Namespace) -> None:
     with Bars() as bars, SaveTogether("" if values.force else "result") as save:
         bars("read", 0.0)
         model = read_model(values.source, values.merge)
+        check_drawing_passed(values.source, values.keep_failed)
         for note in model.notes:
             bars.note(note)
         if values.unit is not None:

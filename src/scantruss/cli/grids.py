@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from .options import Parser
 
 HEAD = 200  # bytes of a file in which its format stands
+COMMENTS = 4_000  # bytes in which the comments of an OBJ or PLY of ours stand
 DRAWN = ".obj .ply .dxf .3dm .ifc .compas.json"  # that `read_model` reads
 
 
@@ -29,8 +30,14 @@ def add_grid(parser: Parser, about: str, name: str = "grid", metavar: str = "GRI
     )
 
 
-def read_saved_grid(path: str, merge: float | None, bars: Bars | None = None) -> Grid:
-    """Return the grid of a file; what is to be known of one that others drew is noted."""
+def read_saved_grid(path: str, merge: float | None, keep_failed: bool, bars: Bars | None = None) -> Grid:
+    """Return the grid of a file; what is to be known of one that others drew is noted.
+
+    Raises
+    ------
+    CertificateError
+        It is a drawing of a grid that failed, which is not to be used all the same.
+    """
     from ..export.formats import FORMATS, read_model
     from ..export.json import read_grid
     from ..report.terminal import print_lines
@@ -39,6 +46,7 @@ def read_saved_grid(path: str, merge: float | None, bars: Bars | None = None) ->
     if (row := FORMATS.get(suffix_of(Path(path), FORMATS))) is None or row.draw is None:
         return read_grid(path)
     model = read_model(path, merge)
+    check_drawing_passed(path, keep_failed)
     for note in model.notes:
         bars.note(note) if bars else print_lines([note])
     assert model.grid is not None  # drawings are no structures
@@ -46,7 +54,7 @@ def read_saved_grid(path: str, merge: float | None, bars: Bars | None = None) ->
 
 
 def read_grid_or_structure(
-    path: str, merge: float | None, bars: Bars | None = None
+    path: str, merge: float | None, keep_failed: bool, bars: Bars | None = None
 ) -> tuple[Grid | Truss, Checked | None]:
     """Return what a file holds, and of a structure what it says of the checks."""
     from ..structure.json import STRUCTURE_FORMAT, read_checked
@@ -54,4 +62,22 @@ def read_grid_or_structure(
     with Path(path).open("rb") as file:
         if f'"{STRUCTURE_FORMAT}"'.encode() in file.read(HEAD):
             return read_checked(path)
-    return read_saved_grid(path, merge, bars), None
+    return read_saved_grid(path, merge, keep_failed, bars), None
+
+
+def check_drawing_passed(path: str, keep_failed: bool) -> None:
+    """Refuse an OBJ or PLY of a grid that failed its certificate, as its first lines say.
+
+    Raises
+    ------
+    CertificateError
+        It did, and is not to be used all the same.
+    """
+    from ..errors import CertificateError
+    from ..export.obj import FAILED
+
+    with Path(path).open("rb") as file:
+        first = file.read(COMMENTS).decode("latin-1").splitlines()
+    if not keep_failed and (said := next((line for line in first if FAILED in line), "")):
+        words = said.partition(FAILED)[2]
+        raise CertificateError(f"{path} is of a grid that {FAILED}{words}; --keep-failed uses it anyway")

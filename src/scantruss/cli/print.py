@@ -87,7 +87,7 @@ def print_solid(values: Namespace) -> None:
     taken = {Path(values.grid).resolve(): "grid"}
     for out in outs:
         claim(out, "model", taken, force=values.force)
-    what, _ = read_grid_or_structure(values.grid, values.merge)
+    what, _ = read_grid_or_structure(values.grid, values.merge, values.keep_failed)
     result = grid_in_metres(what) if isinstance(what, Truss) else what
     if values.bed is not None or values.sockets:
         _print_parts(result, outs, values)

@@ -138,7 +138,7 @@ def make_schedule(values: Namespace) -> None:
 
     with Bars() as bars, SaveTogether("" if values.force else "result") as save:
         bars("read", 0.0)
-        what, checked = read_grid_or_structure(values.grid, values.merge, bars)
+        what, checked = read_grid_or_structure(values.grid, values.merge, values.keep_failed, bars)
         bars("schedules", 0.0)
         made = schedule(what, settings, keep_failed=values.keep_failed, checked=checked)
         files: dict[Path, int] = {}

@@ -94,7 +94,7 @@ def make_setting_out(values: Namespace) -> None:
             claim(check_setout_place(place), "setting out", taken, force=values.force)
     with Bars() as bars, SaveTogether("" if values.force else "result") as save:
         bars("read", 0.0)
-        what, _ = read_grid_or_structure(values.grid, values.merge, bars)
+        what, _ = read_grid_or_structure(values.grid, values.merge, values.keep_failed, bars)
         if isinstance(what, Truss) and (own := given.keys() & {"supports", "joints", "scale", "unit"}):
             raise InputError(f"a structure has {min(own)} of its own; leave --{min(own)} out")
         made = set_out(what, settings, keep_failed=values.keep_failed, progress=bars)

@@ -130,7 +130,7 @@ def structure(values: Namespace) -> None:
     from ..structure.truss import Truss
 
     with Bars() as bars, SaveTogether("" if values.force else "result") as save:
-        grid = read_saved_grid(values.grid, values.merge, bars)
+        grid = read_saved_grid(values.grid, values.merge, values.keep_failed, bars)
         check_passed(grid, values.keep_failed)
         bars("structure", 0.1)
         truss = Truss.from_grid(grid, **_arguments(grid, settings))
