@@ -29,9 +29,9 @@ WARN_SHARE = 0.01  # share of the points in such a part from which on it is said
 # the noise [member lengths]: as where one row of triangles runs along a bent strip; of two layers, followed by turns, it is half at most
 MOST_UNFOLLOWED, LEAST_OFF = 0.55, 0.05
 WARN_UNFOLLOWED = 0.3  # ... above which that is said: 0.30 to 0.48 on corrugated roofs, at most 0.26 on 200 grids that keep to their scans
-# ... and above which it is a fault where a twentieth of the points lie farther off than this: blocks, where a figure has a waist and a
+# share above which it is a fault where a twentieth of the points lie farther off than this: blocks, where a figure has a waist and a
 # neck; the waves of a roof that are smoothed out are lower [member lengths]
-FAR_UNFOLLOWED, TWENTIETH = 0.25, 0.95
+SHARE_OF_COARSE, FAR_OFF_COARSE, TWENTIETH = 0.25, 0.24, 0.95
 # share of the points on triangles that stand off the middle of their points by more than the second, above which a grid does not follow
 # the mean surface of its scan: a body smoothed away is smaller than the scan, folds that are lie on both sides [member lengths]
 MOST_OFF_MEAN, OFF_MEAN = 0.33, 0.2
@@ -62,12 +62,8 @@ def unfollowed_parts(
     parts = [which[part == number] for number in large[np.argsort(-points[large], kind="stable")].tolist()]
     long = [own for own in parts if _size(own, samples) >= LONG * members[own].mean()]
     if not long and len(which) > WARN_UNFOLLOWED * chosen.sum():
-        unit, worst = f" {grid.unit}" if grid.unit else "", int(which[found.scan[which].argmax()])
-        words = (
-            f"smooths out waves or folds of the scan: {len(which) / chosen.sum():.0%} of its points lie up to"
-            f" {found.scan[worst]:.3g}{unit} off; shorter members follow them"
-        )
-        return [Fault("unfollowed", words, place_of(samples.scan[worst] + samples.origin))]
+        what, share = "smooths out waves or folds of the scan", f"{len(which) / chosen.sum():.0%}"
+        return [_points_off(samples, found, which, f"{what}: {share}", "; shorter members follow them")]
     return [_warning(grid, samples, found, long)] if long else []
 
 
@@ -78,20 +74,28 @@ def mostly_unfollowed(
 
     Parameters as of `unfollowed_parts`.
     """
-    followed_to, count = np.maximum(_followed_to(grid), LEAST_OFF), int(chosen.sum())
-    which = _off(samples, found, chosen, members, followed_to, WARN_UNFOLLOWED * count)
-    if len(which) <= WARN_UNFOLLOWED * count:
+    followed_to, count = _followed_to(grid), int(chosen.sum())
+    which = _off(samples, found, chosen, members, followed_to, SHARE_OF_COARSE * count)
+    if len(which) <= SHARE_OF_COARSE * count:
         return []
-    unit, worst = f" {grid.unit}" if grid.unit else "", int(which[found.scan[which].argmax()])
-    off = f"{len(which) / count:.1%} of its points lie up to {found.scan[worst]:.3g}{unit} off"
-    where = place_of(samples.scan[worst] + samples.origin)
-    if len(which) > MOST_UNFOLLOWED * count:
-        return [Fault("unfollowed", f"follows less than half of the scan: {off}", where)]
-    far, noise = float(np.quantile(found.scan[chosen] / members[chosen], TWENTIETH)), float(np.median(found.noise))
-    if far <= FAR_UNFOLLOWED + noise / float(members.max()):
+    far = _off(samples, found, chosen, members, np.maximum(followed_to, LEAST_OFF), MOST_UNFOLLOWED * count)
+    if len(far) > MOST_UNFOLLOWED * count:
+        return [_points_off(samples, found, far, f"follows less than half of the scan: {len(far) / count:.1%}")]
+    noise = float(np.median(found.noise)) / float(members.max())
+    twentieth = float(np.quantile(found.scan[chosen] / members[chosen], TWENTIETH))
+    if twentieth <= FAR_OFF_COARSE + noise:
         return []
-    words = f"is too coarse for the shape of the scan: {off}, one in twenty by more than {far:.2f} members"
-    return [Fault("unfollowed", words, where)]
+    what, share = "is too coarse for the shape of the scan", f"{len(which) / count:.1%}"
+    return [
+        _points_off(samples, found, which, f"{what}: {share}", f", one in twenty by {twentieth:.2f} members or more")
+    ]
+
+
+def _points_off(samples: SurfaceSamples, found: Distances, which: np.ndarray, what: str, more: str = "") -> Fault:
+    """Return the fault or warning of points (K,) that are not followed, with words before and after how far off they are."""
+    unit, worst = f" {samples.unit}" if samples.unit else "", int(which[found.scan[which].argmax()])
+    words = f"{what} of its points lie up to {found.scan[worst]:.3g}{unit} off{more}"
+    return Fault("unfollowed", words, place_of(samples.scan[worst] + samples.origin))
 
 
 def off_mean_surface(
