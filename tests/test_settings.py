@@ -7,6 +7,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -15,6 +16,8 @@ from scantruss.cli.options import Parser as OptionParser
 from scantruss.cli.options import add_settings, option_of, settings_of
 from scantruss.cli.positions import read_positions
 from scantruss.errors import FormatError, InputError
+from scantruss.pipeline import grid_from_points
+from scantruss.scan.cloud import PointCloud
 from scantruss.settings import Settings
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -146,3 +149,29 @@ def test_a_file_that_is_nested_too_deeply_is_no_settings_file(tmp_path: Path) ->
     path.write_text("[" * 200_000)
     with pytest.raises(InputError, match="not a settings file"):
         Settings.read(path)
+
+
+@pytest.mark.parametrize(
+    "taken",
+    [
+        {"crop": "box:0,0,-1,5,10,1"},
+        {"classes": 2},
+        {"returns": "first"},
+        {"confidence": 0.5},
+        {"z_unit": "foot"},
+        {"thin_spacing": 0.3},
+    ],
+)
+def test_what_chooses_points_of_a_file_is_refused_for_an_array(taken: dict[str, Any]) -> None:
+    """It was ignored: the grid was of all points."""
+    settings = Settings(length=1.0, **taken)
+    with pytest.raises(InputError, match=f"{next(iter(taken))} acts while a scan file is read"):
+        grid_from_points(np.zeros((10, 3)), settings)
+
+
+def test_a_cloud_gives_the_grid_of_its_points() -> None:
+    points = np.random.default_rng(3).uniform([0.0, 0.0, 0.0], [6.0, 4.0, 0.01], (3_000, 3))
+    settings = Settings(length=1.0, effort="quick")
+    cloud = PointCloud.from_array(points, unit="m")
+    one, other = grid_from_points(cloud, settings), grid_from_points(points, settings)
+    assert one.unit == "m" and np.array_equal(one.scan_nodes, other.scan_nodes)

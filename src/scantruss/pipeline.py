@@ -29,14 +29,18 @@ LEAST_EFFORT = "quick"
 
 
 def grid_from_points(
-    points: np.ndarray, settings: Settings, *, progress: Progress | None = None, keep_failed: bool = False
+    points: np.ndarray | PointCloud,
+    settings: Settings,
+    *,
+    progress: Progress | None = None,
+    keep_failed: bool = False,
 ) -> Grid:
-    """Return the grid of an array of points.
+    """Return the grid of an array of points, or of a cloud.
 
     Parameters
     ----------
-    points : (N, 3) array
-        Measured points [scan unit].
+    points : (N, 3) array or PointCloud
+        Measured points [scan unit], or what `read_points` or `clean_points` returned.
     settings : Settings
         Desired member length and everything else.
     progress : callable, optional
@@ -48,9 +52,18 @@ def grid_from_points(
     -------
     Grid
         With `settings`, `before` (quality before the optimization), `certificate` and `seconds` of each stage.
+
+    Raises
+    ------
+    ScanTrussError
+        No grid can be made, with the reason; or a setting chooses what is read of a file, and an array is taken whole.
     """
     settings, started = Settings.check(settings), perf_counter()
-    cloud = PointCloud.from_array(points, unit=settings.unit)
+    if isinstance(points, PointCloud):
+        cloud = points
+    else:
+        settings.check_for_array()
+        cloud = PointCloud.from_array(points, unit=settings.unit)
     spent = perf_counter() - started
     return grid_from_cloud(cloud, settings, progress=progress, keep_failed=keep_failed, read_seconds=spent)
 

@@ -106,6 +106,14 @@ class Settings(
         names = [spec.name for spec in fields(Selection)]
         return Selection(**{name: getattr(self, name) for name in names})
 
+    def check_for_array(self) -> None:
+        """Refuse settings that choose what is read of a scan file: an array is taken whole."""
+        for name in (*(spec.name for spec in fields(Selection)), "thin_spacing"):
+            if getattr(self, name) != next(spec.default for spec in fields(self) if spec.name == name):
+                raise InputError(
+                    f"{name} acts while a scan file is read, and an array is taken whole; cut the array or use grid_from_scan"
+                )
+
     @property
     def closed_boundary_length(self) -> float:
         """Holes with a shorter boundary than this are closed [scan unit]."""
