@@ -514,6 +514,23 @@ def test_a_drawing_of_a_failed_grid_is_not_used_unless_told(
     assert main(["convert", name, "b.dxf", "--keep-failed"]) == 0
 
 
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ("--search-range 2", "--search-range: for --method paper"),
+        ("--method paper --ridge-angle 20", "--ridge-angle: for the default method; --method paper does without"),
+        ("--no-ridge-at 1,2,3", "no ridge passes 1, 2, 3, so --no-ridge-at changes nothing there"),
+        ("--method paper --search-range 2", ""),
+    ],
+)
+def test_an_option_that_changes_nothing_is_said(
+    place: Path, capsys: pytest.CaptureFixture[str], words: str, said: str
+) -> None:
+    assert main(["grid", "scan.xyz", "a.obj", "--length", LENGTH, *words.split()]) == 0
+    notes = capsys.readouterr().err
+    assert said in notes if said else "for --method" not in notes and "for the default" not in notes
+
+
 def test_the_report_holds_every_figure(place: Path) -> None:
     assert main(["grid", "scan.xyz", "a.obj", "--length", LENGTH, "--report", "r.json"]) == 0
     report = json.loads((place / "r.json").read_text())

@@ -95,6 +95,7 @@ def grid(values: Namespace) -> None:
     from ..report.figures import report_of
     from ..report.terminal import Bars
     from ..runtime.files import SaveTogether
+    from .idle_options import idle_options
     from .options import has_length, settings_of
 
     outs, style = outs_of(values), style_of(values)
@@ -112,6 +113,8 @@ def grid(values: Namespace) -> None:
         advice = None
         if not has_length(values):
             settings, advice = choose_length(cloud, settings, bars)
+        for words in idle_options(values, cloud, settings):
+            bars.note(words)
         try:
             result = grid_with_notes(
                 cloud, settings, bars, keep_failed=values.keep_failed, read_seconds=spent, advice=advice
