@@ -165,7 +165,7 @@ def test_section_3_4_step_1_the_optimal_point(w1: float) -> None:
     """
     hand = HandFront(square(), length=1.8, length_weight=w1, search_range=3.0)
     assert cases.optimal_point(hand.surface, hand.front, AB, hand.rules, hand.patch)
-    found = hand.front.nodes[hand.front.count[lists.NODES]]
+    found = hand.front.nodes[hand.front.counts.nodes]
     expected = naive.optimal_point(
         hand.surface.points, three(*A), three(*B), (0, 0, 1), 1.8, w1, hand.rules.search_range
     )
@@ -414,7 +414,7 @@ def test_section_3_6_internal_boundaries_are_active_or_inactive(way: str) -> Non
     samples, boundary, constraints = steps_of(cloud, ways[way])
     assert (len(boundary.external), len(boundary.internal)) == (1, 1)
     front = start_front(new_front(samples, ways[way]), samples, boundary, constraints, ways[way])
-    count = front.count[lists.SEGMENTS]
+    count = front.counts.segments
     away = np.linalg.norm(front.nodes[front.tail[:count], :2], axis=1)
     assert (front.state[:count][away > 4] == lists.ACTIVE).all()
     assert (front.state[:count][away < 4] == (lists.ACTIVE if way == "all" else lists.INACTIVE)).all()

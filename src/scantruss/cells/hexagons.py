@@ -258,7 +258,7 @@ def even_out(mesh: WorkingMesh, grid: Grid, length: float) -> None:
     usual = np.where(seam, TRIANGLE_MEMBER, 1.0)
     panels = grid.panel_table
     before, after = _corners(panels)
-    normals = mesh.patches[:count, 3:6]
+    normals = mesh.patches["normal"][:count]
     at_boundary = np.zeros(count, np.bool_)
     seam_members = grid.edges[seam]
     at_boundary[seam_members.ravel()] = True

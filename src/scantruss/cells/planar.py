@@ -24,7 +24,7 @@ from ..grid.panels import (
 )
 from ..improve.working_mesh import WorkingMesh
 from ..kernels.mesh.grid import AT_REST, INTERIOR, ON_CURVE
-from ..kernels.surface.local_surface import NORMAL, feet_on_patches
+from ..kernels.surface.local_surface import feet_on_patches
 from .factor import factored
 from .stops import slide_back, ways_along
 
@@ -136,7 +136,7 @@ def _feet(mesh: WorkingMesh, count: int) -> Feet:
     nodes, patches = mesh.net.nodes[:count], mesh.patches[:count]
     foot = np.empty((count, 3))
     feet_on_patches(patches, nodes, foot)
-    normal = patches[:, NORMAL : NORMAL + 3].copy()
+    normal = patches["normal"].copy()
     return Feet(normal, ((nodes - foot) * normal).sum(axis=1))
 
 

@@ -50,7 +50,7 @@ def new_area(mesh: WorkingMesh, number: int = 0) -> Area:
         arc=np.zeros(MOST_NODES),
         desired=np.zeros(MOST_NODES),
         ring=np.zeros((MOST_NODES, width), np.int64),
-        patches=np.zeros((MOST_NODES, mesh.patches.shape[1])),
+        patches=np.zeros(MOST_NODES, mesh.patches.dtype),
         free=np.zeros(SAVED_FREE_NODES, np.int64),
         **{name: np.zeros(1, np.int64) for name in ("saved", "spare", "number", "gathered", "paid")},
         seed=np.array([7919 * number]),

@@ -14,7 +14,6 @@ from ..surface.local_surface import Surface, fit_patch, flood, onto_patch, patch
 from .fits import clear_of_front, faces_away, fits, left_angle, near_nodes, right_angle
 from .front import (
     INACTIVE,
-    NODES,
     Front,
     Rules,
     add_node,
@@ -253,7 +252,7 @@ def divide_quadrangle(front: Front, s: int, rules: Rules, found: np.ndarray, nea
 
 
 @kernel
-def optimal_point(surface: Surface, front: Front, s: int, rules: Rules, patch: np.ndarray) -> bool:
+def optimal_point(surface: Surface, front: Front, s: int, rules: Rules, patch: np.record) -> bool:
     """Step 1 of Sec. 3.4: propose the point of the cloud that makes the best triangle with a segment; False if there is none.
 
     The search covers the points no farther than b from the plane that halves the segment, at r - h to r + h from the segment, on its
@@ -358,12 +357,12 @@ def best_existing_node(front: Front, s: int, rules: Rules, found: np.ndarray, ne
 
 @kernel
 def new_node(
-    surface: Surface, front: Front, s: int, rules: Rules, found: np.ndarray, near: int, patch: np.ndarray
+    surface: Surface, front: Front, s: int, rules: Rules, found: np.ndarray, near: int, patch: np.record
 ) -> bool:
     """Table 1, case 4: the three steps of Sec. 3.4."""
     if not optimal_point(surface, front, s, rules, patch):
         return False
-    p = front.count[NODES]
+    p = front.counts.nodes
     pp = row(front.nodes, p)
     if far_from_front(front, s, p, pp, found, near, rules.nearness * rules.length, rules.length):
         good, passage = fits(front, s, p, found, near, rules.length, CASE_STRICTNESS)
@@ -377,7 +376,7 @@ def new_node(
 
 
 @kernel
-def choose_by_case(surface: Surface, front: Front, s: int, rules: Rules, found: np.ndarray, patch: np.ndarray) -> bool:
+def choose_by_case(surface: Surface, front: Front, s: int, rules: Rules, found: np.ndarray, patch: np.record) -> bool:
     """Advance a segment by the six cases of Table 1; False if the case's triangle does not fit."""
     near = near_nodes(surface, front, s, SEARCH_REACH * rules.length, rules.length, found)
     case = case_of(front, s, left_angle(front, s), right_angle(front, s), rules.merge_angle)

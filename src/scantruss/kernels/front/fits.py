@@ -21,7 +21,7 @@ from ..geometry.triangles import (
 )
 from ..geometry.vectors import Vector, across, along, cross, dot, norm, row, subtract, unit
 from ..surface.local_surface import Surface, linked
-from .front import LOOK_AT_EDGES, NODES, Front, edge_exists
+from .front import Front, edge_exists
 
 # how far from a triangle a line of the front that faces as it does may be and still be crossed [member lengths]
 FOLD_DISTANCE = 0.85
@@ -60,7 +60,7 @@ def same_sheet(surface: Surface, front: Front, a: int, q: int, length: float) ->
 @kernel
 def faces_away(front: Front, normal: Vector, q: int) -> bool:
     """Whether a node lies on the other side of a sharp edge of a body, seen from a place of that normal."""
-    return front.count[LOOK_AT_EDGES] == 1 and dot(normal, row(front.normals, q)) < FACES_AWAY
+    return front.sharp_edges and dot(normal, row(front.normals, q)) < FACES_AWAY
 
 
 @kernel
@@ -171,7 +171,7 @@ def fits(front: Front, s: int, p: int, found: np.ndarray, near: int, length: flo
         if _sector(front, front.next[after], a) >= NO_SECTOR:
             return False, -1
     else:
-        if p < front.count[NODES] and front.out[p] >= 0:
+        if p < front.counts.nodes and front.out[p] >= 0:
             passage = passage_of(front, s, p)
             if passage < 0:
                 return False, -1

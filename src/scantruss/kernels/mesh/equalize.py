@@ -13,9 +13,9 @@ import numpy as np
 
 from ...runtime.jit import kernel
 from ..boundary.curves import Curves, slide
-from ..geometry.vectors import dot, subtract, vector_in
-from ..surface.folds import FOLD_WEIGHT, chord_energy, chord_slope, fold_energy, fold_slope
-from ..surface.local_surface import CENTRE, NORMAL, onto_patch
+from ..geometry.vectors import dot, subtract, vector_of
+from ..surface.folds import chord_energy, chord_slope, fold_energy, fold_slope
+from ..surface.local_surface import onto_patch
 from .grid import AT_REST, INTERIOR, ON_CURVE, Net
 
 FOUR_ROOT_3 = 4.0 * math.sqrt(3.0)  # makes the shape quality of a regular triangle 1 (Eq. 5)
@@ -35,7 +35,7 @@ def star_energy(
     nodes = net.nodes
     gx = gy = gz = energy = 0.0  # of the members
     sx = sy = sz = shape = 0.0  # of the triangles
-    nx, ny, nz = vector_in(patches, v, NORMAL)
+    nx, ny, nz = vector_of(patches[v].normal)
     d, half = net.degree[v], 0.5 * length
     own = half * net.desired[v]
     w = net.ring[v, d - 1]
@@ -74,14 +74,14 @@ def star_energy(
             sx += h * (bx + cx) - f * (ey * uz - ez * uy)
             sy += h * (by + cy) - f * (ez * ux - ex * uz)
             sz += h * (bz + cz) - f * (ex * uy - ey * ux)
-    if patches[v, FOLD_WEIGHT] > 0.0:
+    if patches[v].fold_weight > 0.0:
         energy += fold_energy(patches, v, x, y, z)
         if slope:
             fx, fy, fz = fold_slope(patches, v, x, y, z)
             gx, gy, gz = gx + fx, gy + fy, gz + fz
     for i in range(d):
         w = net.ring[v, i]
-        if patches[v, FOLD_WEIGHT] > 0.0 or patches[w, FOLD_WEIGHT] > 0.0:
+        if patches[v].fold_weight > 0.0 or patches[w].fold_weight > 0.0:
             hx, hy, hz = 0.5 * (x + nodes[w, 0]), 0.5 * (y + nodes[w, 1]), 0.5 * (z + nodes[w, 2])
             energy += chord_energy(patches, v, w, hx, hy, hz)
             if slope:
@@ -105,7 +105,7 @@ def settle_node(
     x, y, z = net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2]
     before, gx, gy, gz = star_energy(net, patches, v, x, y, z, length, weight, True)
     if kind == INTERIOR:
-        nx, ny, nz = vector_in(patches, v, NORMAL)
+        nx, ny, nz = vector_of(patches[v].normal)
         across = gx * nx + gy * ny + gz * nz
         gx, gy, gz = gx - across * nx, gy - across * ny, gz - across * nz
     local = length * net.desired[v]
@@ -123,7 +123,7 @@ def settle_node(
             arc, px, py, pz = slide(curves, net.curve[v], net.arc[v], most, place[0], place[1], place[2])
         else:
             px, py, pz = onto_patch(patches[v], place)
-            d = subtract((px, py, pz), vector_in(patches, v, CENTRE))
+            d = subtract((px, py, pz), vector_of(patches[v].centre))
             if dot(d, d) > PATCH_REACH * PATCH_REACH * local * local:
                 step *= 0.3
                 continue

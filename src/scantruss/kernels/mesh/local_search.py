@@ -8,7 +8,7 @@ import numpy as np
 
 from ...runtime.jit import kernel
 from ..boundary.curves import Curves, at_arc
-from ..geometry.vectors import cross, dot, fill_row, norm, row, subtract
+from ..geometry.vectors import cross, dot, norm, row, subtract
 from .equalize import RELAXATION, settle_node
 from .grid import (
     ON_CURVE,
@@ -123,7 +123,7 @@ def make_move(net: Net, patches: np.ndarray, curves: Curves, scratch: Scratch, m
         collapse(net, a, b)
         return -1
     added = split(net, a, b)
-    fill_row(patches[added], patches[a])
+    patches[added] = patches[a]
     place_between(net, curves, added, a, b)
     net.ideal[added] = 4 if net.is_open[added] == 1 else 6
     scratch.held[added] = scratch.trial[0]

@@ -56,7 +56,7 @@ class Area(NamedTuple):
     curve: np.ndarray  #: (A,) int64
     ideal: np.ndarray  #: (A,) int64
     line: np.ndarray  #: (A,) int64
-    patches: np.ndarray  #: (A, PATCH_COLUMNS) their local surfaces: a node that is freed may come back elsewhere
+    patches: np.ndarray  #: (A,) SURFACE_PATCH, their local surfaces: a node that is freed may come back elsewhere
     free: np.ndarray  #: (SAVED_FREE_NODES,) int64 the top of the stack of free nodes
     saved: np.ndarray  #: (1,) int64 how many of these are saved
     spare: np.ndarray  #: (1,) int64 how many nodes were free
@@ -107,7 +107,7 @@ def list_area(net: Net, patches: np.ndarray, area: Area, v: int) -> int:
         fill_row(area.ring[k], net.ring[u])
         area.degree[k], area.is_open[k], area.kind[k] = net.degree[u], net.is_open[u], net.kind[u]
         area.curve[k], area.ideal[k], area.line[k] = net.curve[u], net.ideal[u], net.line[u]
-        fill_row(area.patches[k], patches[u])
+        area.patches[k] = patches[u]
     free = net.spare[0]
     area.spare[0], area.saved[0] = free, min(free, SAVED_FREE_NODES)
     for k in range(area.saved[0]):
@@ -131,7 +131,7 @@ def put_area_back(net: Net, patches: np.ndarray, area: Area) -> None:
         fill_row(net.ring[u], area.ring[k])
         net.degree[u], net.is_open[u], net.kind[u] = area.degree[k], area.is_open[k], area.kind[k]
         net.curve[u], net.ideal[u], net.line[u] = area.curve[k], area.ideal[k], area.line[k]
-        fill_row(patches[u], area.patches[k])
+        patches[u] = area.patches[k]
 
 
 @kernel

@@ -6,7 +6,7 @@ import numpy as np
 
 from ...runtime.jit import kernel
 from ..geometry.kd_tree import STACK_LEVELS, KDTree
-from ..geometry.quadric import COLUMNS, RESIDUAL, SQUARE
+from ..geometry.quadric import FIT_POINT
 from ..geometry.vectors import along, dot, row, subtract, unit
 from ..surface.patches import Patches, fit, foot, gather
 
@@ -39,7 +39,7 @@ def fit_patches(
     flatness : (C,), filled with the kurtosis of the distances of the points from each patch, see `_flatness`
     """
     stack, found = np.empty(2 * STACK_LEVELS, np.int64), np.empty(MOST_AROUND, np.int64)
-    buffer, matrix = np.zeros((MOST_AROUND, COLUMNS)), np.zeros((6, 7))
+    buffer, matrix = np.zeros(MOST_AROUND, FIT_POINT), np.zeros((6, 7))
     for i in range(begin, end):
         place = row(tree.points, centres[i])
         taken = gather(tree, place, widest * radii[i], -1, stack, found, buffer)
@@ -60,8 +60,8 @@ def _flatness(buffer: np.ndarray, taken: int, radius: float) -> float:
     """Kurtosis of the distances from a patch, fourth moment over squared variance: 3 for noise, 1 for points at two distances."""
     total = second = fourth = 0.0
     for i in range(taken):
-        w = max(1.0 - buffer[i, SQUARE] / (radius * radius), 0.0)
-        square = buffer[i, RESIDUAL] * buffer[i, RESIDUAL]
+        w = max(1.0 - buffer[i].square / (radius * radius), 0.0)
+        square = buffer[i].residual * buffer[i].residual
         total, second, fourth = total + w, second + w * square, fourth + w * square * square
     return fourth * total / (second * second) if second > 0.0 else 3.0
 

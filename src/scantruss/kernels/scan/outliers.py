@@ -9,8 +9,8 @@ import numpy as np
 from ...runtime.jit import kernel
 from ..geometry.kd_tree import STACK_LEVELS, KDTree, nearest
 from ..geometry.planes import plane_of
-from ..geometry.quadric import COLUMNS, SQUARE
-from ..geometry.vectors import Vector, across, cross, dot, norm, row, subtract
+from ..geometry.quadric import FIT_POINT
+from ..geometry.vectors import Vector, across, cross, dot, norm, put_vector, row, subtract
 from ..surface.patches import POINTS_FOR_PLANE, POINTS_FOR_QUADRIC, empty_patches, fit, height_variance, terms_for
 
 OUTLIER_PATCH_FITS = 3  # fits of a patch, each with less weight for points off the one before
@@ -79,7 +79,7 @@ def stand_off(
     uncertainty of the surface, which is large at a boundary. least : least thickness, as a share of the radius.
     """
     stack, found, away = np.empty(2 * STACK_LEVELS, np.int64), np.empty(8 * around, np.int64), np.empty(8 * around)
-    buffer, matrix, patches = np.zeros((2 * around, COLUMNS)), np.zeros((6, 7)), empty_patches(1)
+    buffer, matrix, patches = np.zeros(2 * around, FIT_POINT), np.zeros((6, 7)), empty_patches(1)
     for i in range(begin, end):
         p = which[i]
         off[i] = 0.0
@@ -91,8 +91,8 @@ def stand_off(
             for k in range(count):
                 if found[k] != p and alive[found[k]] and taken < around:
                     d = subtract(row(tree.points, found[k]), place)
-                    buffer[taken, 0], buffer[taken, 1], buffer[taken, 2] = d
-                    buffer[taken, SQUARE] = away[k]
+                    put_vector(buffer[taken].place, d)
+                    buffer[taken].square = away[k]
                     radius = 1.1 * math.sqrt(away[k])
                     taken += 1
             most *= 2

@@ -139,7 +139,7 @@ def _deform(
     along = chord[0] / length, chord[1] / length, chord[2] / length
     both = before[0] + chord[0], before[1] + chord[1], before[2] + chord[2]
     deformed[0] = dot(change, both) / (length + first)
-    put_vector(slopes[0, 0], 0, along)
+    put_vector(slopes[0, 0], along)
     least = 1.0
     for end in range(2):
         _turn(axes, turns[ends[end]], frames[end])
