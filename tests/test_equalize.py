@@ -296,7 +296,9 @@ def test_a_node_does_not_leave_the_part_of_the_scan_that_its_patch_knows(away: f
     mesh.patches[v].centre = net.nodes[v] + away * length * along
     mesh.patches[v].heights = 0.0
     place = net.nodes[v].copy()
-    gained = kernels.settle_node(net, mesh.patches, mesh.curves, v, length, LENGTH_WEIGHT, 1e-6, kernels.RELAXATION)
+    gained = kernels.settle_node(
+        net, mesh.patches, mesh.curves, v, length, LENGTH_WEIGHT, 1e-6, kernels.OVER_RELAXATION
+    )
     assert (gained > 0) == moves == bool(np.linalg.norm(net.nodes[v] - place) > 0)
     assert np.linalg.norm(net.nodes[v] - mesh.patches[v].centre) <= kernels.PATCH_REACH * length
     assert abs((net.nodes[v] - place) @ normal) < 1e-9
@@ -310,6 +312,6 @@ def test_long_strides_even_out_a_whole_grid_in_half_the_sweeps(rough: Rough) -> 
         settle(mesh, LENGTH_WEIGHT, 0.0, sweeps, stride)
         return total_energy(mesh.net, mesh.patches, new_scratch(mesh), mesh.length, LENGTH_WEIGHT)[0]
 
-    plain, long = energy_after(36, kernels.RELAXATION), energy_after(18, LAST_RELAXATION)
+    plain, long = energy_after(36, kernels.OVER_RELAXATION), energy_after(18, LAST_RELAXATION)
     assert long < plain * 1.001
     assert long < energy_after(18, 1.0)

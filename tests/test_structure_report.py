@@ -15,7 +15,7 @@ import scantruss as st
 from scantruss.cli.main import main
 from scantruss.report.structural.contents import report_parts
 from scantruss.report.structural.parts import DataTable
-from scantruss.report.structural.pdf import WIDTH, _width, _wrapped
+from scantruss.report.structural.pdf import TEXT_WIDTH, _width, _wrapped
 from scantruss.report.structural.source import ReportSource, greatest_stresses
 from scantruss.report.structural.words import fixed, load_words, support_words
 from scantruss.runtime.ours import kind_of_ours
@@ -160,8 +160,8 @@ def test_lines_of_a_pdf_fit_and_lose_nothing() -> None:
     rng = np.random.default_rng(0)
     for _ in range(20):
         words = " ".join("m" * int(n) for n in rng.integers(1, 90, 12))
-        lines = _wrapped(words, 9.0, WIDTH)
-        assert max(_width(line, 9.0) for line in lines) <= WIDTH
+        lines = _wrapped(words, 9.0, TEXT_WIDTH)
+        assert max(_width(line, 9.0) for line in lines) <= TEXT_WIDTH
         assert "".join(lines).replace(" ", "") == words.replace(" ", "")
 
 

@@ -229,10 +229,12 @@ def test_the_frame_and_back_is_nothing_and_a_section_cuts_at_its_plane() -> None
 
 
 def test_lines_are_seen_in_the_colours_of_the_legend() -> None:
-    from scantruss.studio.colours import DIMMED, DIVERGING, PLAIN, RISING, ramp
+    from scantruss.studio.colours import DIMMED_COLOUR, DIVERGING_COLOURS, PLAIN_COLOUR, RISING_COLOURS, ramp
 
     shares = np.linspace(0, 1, 60)
-    wanted = np.concatenate([ramp(shares, RISING), ramp(shares, DIVERGING), PLAIN[None], DIMMED[None]])
+    wanted = np.concatenate(
+        [ramp(shares, RISING_COLOURS), ramp(shares, DIVERGING_COLOURS), PLAIN_COLOUR[None], DIMMED_COLOUR[None]]
+    )
     assert np.abs(seen(to_be_seen(wanted)) - wanted).max() < 8
     measured = np.array([[139, 204, 201]])  # of a line in Chromium, drawn in (33, 145, 140)
     assert np.abs(seen(np.array([[33, 145, 140]])) - measured).max() < 1

@@ -63,7 +63,7 @@ LEFT_BEFORE_ROUND = {
 MOST_ROUNDS = {"quick": 1, "normal": 6, "best": 12}  # further rounds of the search
 LITTLE_LEFT = 0.05  # cost of a quad after a search below which no other start can be much better
 LEAST_FALL = 0.01  # share of the cost that a round must gain for another to follow
-PARTS = 3  # pieces that a member of the triangles becomes in the fine mesh
+PARTS_OF_MEMBER = 3  # pieces that a member of the triangles becomes in the fine mesh
 FIRST_SWEEPS = 25  # most sweeps before the search
 FIRST_NEAR = 0.4  # distance of a node from the centre of its patch that gets it a new one before the search [members]
 
@@ -107,7 +107,7 @@ def quads_of(
     report(0.0)
     grid = at_stops(grid, boundary.stops, settings.length)
     mesh = opened(grid)
-    coarse, fine = fine_mesh(grid, mesh, 1), fine_mesh(grid, mesh, PARTS)
+    coarse, fine = fine_mesh(grid, mesh, 1), fine_mesh(grid, mesh, PARTS_OF_MEMBER)
     closer = [replace(each, length=each.length * row_lengths(mesh, each.nodes)) for each in (coarse, fine)]
     guide = principal_directions(mesh, len(coarse.nodes)) if settings.rows == "curvature" else None
     price = IRREGULAR_PRICE if guide is None else LED_IRREGULAR_PRICE

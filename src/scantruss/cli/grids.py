@@ -12,15 +12,17 @@ if TYPE_CHECKING:
     from ..structure.truss import Truss
     from .options import Parser
 
-HEAD = 200  # bytes of a file in which its format stands
-DRAWN = ".obj .ply .dxf .3dm .ifc .compas.json"  # that `read_model` reads
+BYTES_OF_HEAD = 200  # bytes of a file in which its format stands
+DRAWN_SUFFIXES = ".obj .ply .dxf .3dm .ifc .compas.json"  # that `read_model` reads
 
 
 def add_grid(parser: Parser, about: str, name: str = "grid", metavar: str = "GRID") -> None:
     """Add the argument of a grid, and how one that others drew is read."""
     from .options import number
 
-    parser.add_argument(name, metavar=metavar, help=f"{about}, or lines or faces from another program: {DRAWN}")
+    parser.add_argument(
+        name, metavar=metavar, help=f"{about}, or lines or faces from another program: {DRAWN_SUFFIXES}"
+    )
     parser.add_argument(
         "--merge",
         metavar="D",
@@ -52,6 +54,6 @@ def read_grid_or_structure(
     from ..structure.json import STRUCTURE_FORMAT, read_checked
 
     with Path(path).open("rb") as file:
-        if f'"{STRUCTURE_FORMAT}"'.encode() in file.read(HEAD):
+        if f'"{STRUCTURE_FORMAT}"'.encode() in file.read(BYTES_OF_HEAD):
             return read_checked(path)
     return read_saved_grid(path, merge, bars), None

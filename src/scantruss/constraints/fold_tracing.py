@@ -259,7 +259,7 @@ SHARPEST_EDGE = 155.0  # most that a surface bends at a fold where sharp edges o
 # median change of the bend from place to place, at most, of folds by up to 50 degrees and by 70 or more [degree]: blunt crests of nature
 # are as sharp as blunt ridges that were made, but not as even
 EVEN_FOLDS = (0.5, 3.5)
-BLUNT, ACUTE = 50.0, 70.0  # angles of folds between which the allowed change of the bend grows [degree]
+BLUNT_FOLD, ACUTE_FOLD = 50.0, 70.0  # angles of folds between which the allowed change of the bend grows [degree]
 BY_NOISE = 0.2  # change of the bend that noise explains, for the root of the gain 1 [radian]
 SURE_GAIN = 25.0  # median gain, at least (F statistic)
 
@@ -302,7 +302,7 @@ def is_even(folds: np.ndarray, angle: float, sharpest: float = SHARPEST_FOLD_ANG
     bends = np.cross(ahead[1:], ahead[:-1])
     uneven = float(np.median(np.linalg.norm(np.diff(bends, axis=0), axis=1))) if len(bends) > 1 else 0.0
     gain, bend = float(np.median(folds["gain"])), np.degrees(float(np.median(angles)))
-    most = np.radians(np.interp(bend, (BLUNT, ACUTE), EVEN_FOLDS)) + BY_NOISE / np.sqrt(max(gain, 1.0))
+    most = np.radians(np.interp(bend, (BLUNT_FOLD, ACUTE_FOLD), EVEN_FOLDS)) + BY_NOISE / np.sqrt(max(gain, 1.0))
     return bool(gain >= SURE_GAIN and uneven <= most and bend < sharpest)
 
 

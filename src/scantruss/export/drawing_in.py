@@ -26,8 +26,8 @@ from .drawing_panels import (
     without_diagonals,
 )
 
-MERGE = 1e-3  #: distance within which ends are one node, in median lengths of lines
-FAR = 1e5  #: coordinates from which on nodes are kept relative to an origin [unit]
+MERGE_DISTANCE = 1e-3  #: distance within which ends are one node, in median lengths of lines
+FAR_FROM_ZERO = 1e5  #: coordinates from which on nodes are kept relative to an origin [unit]
 NEARLY_JOINED = 0.05  #: distance within which nodes that no line joins, and nodes and lines, are taken for badly drawn, in median lengths
 
 
@@ -75,7 +75,7 @@ def grid_of_drawing(drawing: Drawing, name: str, merge: float | None = None) -> 
     if not np.isfinite(drawing.points[pairs]).all():
         raise FormatError(f"{name} has an end that is not a number; export it again")
     median = float(np.median(np.linalg.norm(drawing.points[pairs[:, 1]] - drawing.points[pairs[:, 0]], axis=1)))
-    reach = MERGE * median if merge is None else merge
+    reach = MERGE_DISTANCE * median if merge is None else merge
     points, number = _merged(drawing, np.unique(pairs), reach)
     if (short := number[pairs[:, 0]] == number[pairs[:, 1]]).any():
         where = place_of(drawing.points[pairs[short][0, 0]])
@@ -83,7 +83,7 @@ def grid_of_drawing(drawing: Drawing, name: str, merge: float | None = None) -> 
             f"{name} has {short.sum():,} lines or sides no longer than {reach:.3g}, one at {where}; use a smaller --merge"
         )
     lines = np.unique(np.sort(number[drawing.lines], axis=1), axis=0)
-    far = float(np.abs(points).max()) > FAR
+    far = float(np.abs(points).max()) > FAR_FROM_ZERO
     origin = np.round((points.min(axis=0) + points.max(axis=0)) / 2) if far else np.zeros(3)
     nodes = points - origin
     panels, how = _surface(drawing, lines, number, nodes, origin, name)

@@ -15,7 +15,7 @@ from ..grid.certificate import Certificate
 from ..grid.grid import Grid
 from ..grid.panels import planarity_of, shape_qualities_of, side_lengths_of
 from ..layouts.kinds import families_of_grid, kinds_of_grid
-from .drawing.structure import OVERUSED
+from .drawing.structure import OVERUSED_COLOUR
 from .model import Model
 
 OFF_PLANE = "off its plane / diagonal"  # name of a column of panels
@@ -184,7 +184,7 @@ def colorings_of(tables: Tables) -> list[dict[str, Any]]:
         if any(value is not None for value in values):
             more: dict[str, Any] = {} if middle is None else {"middle": middle}
             if name == "utilization":
-                more["most"] = [1.0, OVERUSED]  # what is more has a colour of its own, as in pictures
+                more["most"] = [1.0, OVERUSED_COLOUR]  # what is more has a colour of its own, as in pictures
             found.append({"kind": kind, "name": name, "words": words, **more})
     return found
 

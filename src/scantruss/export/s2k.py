@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import FormatError
-from ..runtime.ours import MARK
+from ..runtime.ours import MADE_BY
 from .model import Model, temperatures
 from .style import FileStyle
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 S2K_TYPES = {"steel": "Steel", "aluminium": "Aluminum"}  #: of materials; others are "Other"
 PATTERNS = {"permanent": "Dead", "snow": "Snow", "wind": "Wind", "temperature": "Temperature"}  #: others are "Live"
-VERTICAL = 1e-3  #: sine of the angle to z below which SAP2000 takes a member to be vertical
+VERTICAL_SINE = 1e-3  #: sine of the angle to z below which SAP2000 takes a member to be vertical
 S2K_FREEDOMS = ("U1", "U2", "U3", "R1", "R2", "R3")
 
 TableRow = dict[str, Any]  # field -> value
@@ -35,7 +35,7 @@ def encode_s2k(model: Model, style: FileStyle) -> bytes:
     truss = model.truss
     if truss is None:
         raise FormatError("SAP2000 holds structures; make one of the grid with scantruss structure")
-    lines = [f"$ {MARK}"]
+    lines = [f"$ {MADE_BY}"]
     last = ""
     for name, rows in _tables(model, truss):
         if rows and name != last:
@@ -75,7 +75,7 @@ def _quoted(word: str) -> str:
 def frame_angles(axes: np.ndarray) -> np.ndarray:
     """Return the angles (M,) [degrees] by which local axis 2 turns from its default to our z, of (M, 3, 3) local axes as rows."""
     x, z = axes[:, 0], axes[:, 2]
-    upright = np.hypot(x[:, 0], x[:, 1]) < VERTICAL
+    upright = np.hypot(x[:, 0], x[:, 1]) < VERTICAL_SINE
     reference = np.where(upright[:, None], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0])
     second = reference - (reference * x).sum(axis=1, keepdims=True) * x
     second /= np.linalg.norm(second, axis=1, keepdims=True)

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..kernels.mesh.equalize import RELAXATION, settle_some
+from ..kernels.mesh.equalize import OVER_RELAXATION, settle_some
 from ..kernels.mesh.grid import Net
 from ..kernels.mesh.local_search import search, suit_nodes
 from ..kernels.mesh.partition import BETWEEN_PARTS
@@ -79,7 +79,7 @@ def settle(
     weight: float,
     enough: float,
     sweeps: int,
-    stride: float = RELAXATION,
+    stride: float = OVER_RELAXATION,
     independent_sets: list[np.ndarray] | None = None,
 ) -> int:
     """Move the nodes downhill until a sweep gains less than `enough` per node; returns the sweeps made.

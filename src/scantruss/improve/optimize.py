@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from ..surface.samples import SurfaceSamples
 
 # factor of the weight of folds: a longer search can afford more of it
-FOLDS = {"quick": 1.0, "normal": 1.0, "best": 1.6}
+FOLD_WEIGHT_OF_EFFORT = {"quick": 1.0, "normal": 1.0, "best": 1.6}
 TIMES_MENDED = 2  # times that poor places are mended at most, after each of which the mesh comes to rest anew
 
 Report = Callable[[float], None]
@@ -102,7 +102,7 @@ def improve_first(
         boundary.stops,
         settings.length,
         constraints.lines,
-        settings.fold_weight * FOLDS[settings.effort],
+        settings.fold_weight * FOLD_WEIGHT_OF_EFFORT[settings.effort],
     )
     if settings.method == "paper":
         flip_by_angle(mesh.net)

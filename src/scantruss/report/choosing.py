@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from html import escape
 from typing import TYPE_CHECKING
 
-from ..runtime.ours import MARK
+from ..runtime.ours import MADE_BY
 from ..sweep import FIGURES
 
 if TYPE_CHECKING:
@@ -105,7 +105,7 @@ def encode_page(
     ]
     return (
         f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8">\n'
-        f'<meta name="generator" content="{MARK}"><title>{escape(title)}</title>\n'
+        f'<meta name="generator" content="{MADE_BY}"><title>{escape(title)}</title>\n'
         f"<style>\n{STYLE}\n</style></head><body>\n<h1>{escape(title)}</h1>\n"
         + "".join(map(_html_table, tables))
         + "\n".join(pictures)

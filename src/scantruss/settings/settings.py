@@ -12,7 +12,7 @@ from typing import Any
 from ..errors import InputError, did_you_mean
 from ..selection import Selection
 from .records import (
-    HOLE,
+    SMALLEST_HOLE,
     BoundarySettings,
     CheckSettings,
     CleaningSettings,
@@ -109,12 +109,12 @@ class Settings(
     @property
     def closed_boundary_length(self) -> float:
         """Holes with a shorter boundary than this are closed [scan unit]."""
-        return HOLE * self.length if self.fill_holes is None else self.fill_holes
+        return SMALLEST_HOLE * self.length if self.fill_holes is None else self.fill_holes
 
     @property
     def bridged_boundary_length(self) -> float:
         """Of these, the front runs over those with a shorter boundary than this; the others are filled [scan unit]."""
-        return min(HOLE * self.length, self.closed_boundary_length)
+        return min(SMALLEST_HOLE * self.length, self.closed_boundary_length)
 
     def replace(self, **changes: Any) -> Settings:
         """Return a copy with some values changed."""

@@ -17,7 +17,7 @@ from ..export.formats import model_of
 from ..export.json import encode_json, encode_model, read_grid
 from ..grid.grid import Grid
 from ..runtime.files import temporary_folder, write_files
-from ..runtime.ours import MARK
+from ..runtime.ours import MADE_BY
 from ..scan.cloud import PointCloud
 from ..settings import Settings
 from ..structure.options import StructureSettings, read_structure_settings, settings_text
@@ -49,7 +49,7 @@ def save_project(path: Path, state: StudioState) -> None:
     cloud, cleaning = whole.cloud, state.cleaning
     solved = state.grid is not None and state.solution is not None
     head = {
-        "format": PROJECT_FORMAT, "format_version": PROJECT_VERSION, "made_by": MARK,
+        "format": PROJECT_FORMAT, "format_version": PROJECT_VERSION, "made_by": MADE_BY,
         "scan": {"unit": cloud.unit, "system": cloud.system, "name": Path(cloud.name).name, "dropped": cloud.dropped,
                  "notes": list(cloud.notes), "up": whole.up, "left_out": [list(part) for part in cloud.left_out]},
         "cleaning": None if cleaning is None else [cleaning.outlier_distance, cleaning.loose_pieces, list(cleaning.crop)],
@@ -61,7 +61,7 @@ def save_project(path: Path, state: StudioState) -> None:
         "designs": [_head_of_design(each, state) for each in state.designs],
     }  # fmt: skip
     parts = {
-        "made_by.npy": _npy(np.array(MARK)),
+        "made_by.npy": _npy(np.array(MADE_BY)),
         "project.json": (json.dumps(head, indent=1, ensure_ascii=False) + "\n").encode(),
         "scan.npz": _kept(_SCANS, whole, _encode_scan),
         "structure.toml": settings_text(state.structure_settings).encode(),

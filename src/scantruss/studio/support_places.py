@@ -17,7 +17,7 @@ from .page_words import in_words_of_page
 from .state import DEFAULT_STRUCTURE, Placed, StudioState
 
 NODE_MARK = re.compile(r"N\d+\??")
-LOST = "?"  # after the mark of a support where the grid has no node
+LOST_SUPPORT = "?"  # after the mark of a support where the grid has no node
 
 
 def words_of(supports: str) -> list[str]:
@@ -85,7 +85,7 @@ def supports_on(state: StudioState, grid: Grid) -> dict[str, Any]:
     moved = []
     for mark, place in known:
         away = np.linalg.norm(nodes - place, axis=1)
-        there = marks[int(away.argmin())] if away.min() <= reach else mark.rstrip(LOST) + LOST
+        there = marks[int(away.argmin())] if away.min() <= reach else mark.rstrip(LOST_SUPPORT) + LOST_SUPPORT
         named.setdefault(mark, []).append(there)
         moved.append((there, place))
     words = [each for word in words_of(asked.supports) for each in named.get(word, [word])]
@@ -98,7 +98,7 @@ def supports_on(state: StudioState, grid: Grid) -> dict[str, Any]:
 def words_of_lost(state: StudioState) -> str:
     """Return what is said of supports where the grid has no node; "" where each has one."""
     places = dict(state.support_places)
-    lost = [mark for mark in marks_of(state.structure_settings.supports) if mark.endswith(LOST)]
+    lost = [mark for mark in marks_of(state.structure_settings.supports) if mark.endswith(LOST_SUPPORT)]
     if not lost:
         return ""
     said = [f"{mark} stood at {words_of_place(places[mark])}" if mark in places else mark for mark in lost]

@@ -8,7 +8,8 @@ from ...runtime.jit import kernel
 from .quads import FREE_NODE, QuadNet, energy_of_quads, settle_quads
 
 TRIAL_SWEEPS = 8  # most sweeps of a trial
-HOPELESS = ((1, 1.6), (2, 0.6), (4, 0.15))  # sweeps, and the energy over what is allowed that more of them never gained
+# sweeps, and the energy over what is allowed that more of them never gained
+HOPELESS_AFTER = ((1, 1.6), (2, 0.6), (4, 0.15))
 
 
 @kernel
@@ -149,7 +150,7 @@ def try_quads(
     some, start, of = np.empty(4 * row, np.int64), np.zeros(4 * row + 1, np.int64), np.empty(4 * row, np.int64)
     number = inner_nodes(net, before, after, some, start, of)
     growth, made = np.inf, 0
-    for sweeps, too_much in HOPELESS:
+    for sweeps, too_much in HOPELESS_AFTER:
         settle_quads(
             net, after, share, of, start[: number + 1], some[:number], lengths, angles, sweeps - made, stride, enough
         )
@@ -157,7 +158,7 @@ def try_quads(
         growth = energy_of(net, after, share, lengths, angles) - energy
         if growth > allowed + too_much:
             break
-    if growth <= allowed + HOPELESS[-1][1]:
+    if growth <= allowed + HOPELESS_AFTER[-1][1]:
         settle_quads(
             net,
             after,

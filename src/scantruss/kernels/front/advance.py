@@ -39,7 +39,8 @@ from .front import (
 ALONG_LIMB = 0.3  # cosine between a triangle and the normal at a node below which it may shut off a limb
 # distance of the middle of a triangle from the nearest sample at which it has left the sheet [member lengths]
 TRIANGLE_OFF_SHEET = 0.36
-SIGHT, TIP = 0.9, 0.55  # how far such a triangle looks for more scan, and what may lie beyond it [member lengths]
+# how far such a triangle looks for more scan, and what may lie beyond it [member lengths]
+SIGHT_BEYOND_TRIANGLE, LARGEST_TIP_BEYOND = 0.9, 0.55
 STEPS_AROUND = 4  # in which the surface is followed around a bend
 NO_BEND = 0.8  # cosine between the normals before and behind a bend above which it is none
 GOOD_ENOUGH = 0.8  # quality with an existing node, as a share of the best possible, above which no new node is tried
@@ -124,9 +125,9 @@ def propose_on_surface(surface: Surface, front: Front, s: int, place: Vector, pa
 @kernel
 def goes_on(surface: Surface, sample: int, middle: Vector, ahead: Vector, length: float) -> bool:
     """Whether the sheet of a sample goes on beyond a place in a direction, as a limb does beyond a triangle across it."""
-    far = along(middle, SIGHT * length, ahead)
+    far = along(middle, SIGHT_BEYOND_TRIANGLE * length, ahead)
     sample = walk(surface, sample, far)
-    return dot(subtract(row(surface.mean, sample), middle), ahead) > TIP * length
+    return dot(subtract(row(surface.mean, sample), middle), ahead) > LARGEST_TIP_BEYOND * length
 
 
 @kernel

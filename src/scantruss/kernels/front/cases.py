@@ -42,7 +42,8 @@ STEPS_AROUND_MERGED = 2.0
 MARGIN_OF_SEARCH = 1.5  # how much farther than the search range the samples reach whose points are looked at
 WIDENED_SEARCH = 2.0  # by which a search range without points grows, once
 
-TRIANGLE, QUAD, BOTH, NEITHER, RIGHT, LEFT = 1, 2, 3, 4, 5, 6  # rules of the cases in Table 1
+# numbers of the cases in Table 1: closed triangle, closed quadrangle, both angles small, none, only beta, only alpha
+CASE_1, CASE_2, CASE_3, CASE_4, CASE_5, CASE_6 = 1, 2, 3, 4, 5, 6
 
 
 @kernel
@@ -51,14 +52,14 @@ def case_of(front: Front, s: int, alpha: float, beta: float, limit: float) -> in
     before, after = front.previous[s], front.next[s]
     at_end = front.tail[before] == front.head[s] or front.head[after] == front.tail[s]  # of a line
     if front.next[after] == before and not at_end:
-        return TRIANGLE
+        return CASE_1
     if front.next[front.next[after]] == before and not at_end:
-        return QUAD
+        return CASE_2
     if alpha < limit and beta < limit:
-        return BOTH
+        return CASE_3
     if alpha < limit:
-        return LEFT
-    return RIGHT if beta < limit else NEITHER
+        return CASE_6
+    return CASE_5 if beta < limit else CASE_4
 
 
 @kernel
@@ -380,18 +381,18 @@ def choose_by_case(surface: Surface, front: Front, s: int, rules: Rules, found: 
     """Advance a segment by the six cases of Table 1; False if the case's triangle does not fit."""
     near = near_nodes(surface, front, s, SEARCH_REACH * rules.length, rules.length, found)
     case = case_of(front, s, left_angle(front, s), right_angle(front, s), rules.merge_angle)
-    if case == TRIANGLE:
+    if case == CASE_1:
         return close_triangle(front, s, rules, found, near)
-    if case == QUAD:
+    if case == CASE_2:
         return close_quadrangle(front, s, rules, found, near)
-    if case == BOTH:
+    if case == CASE_3:
         if rules.quadrangle:
             return divide_quadrangle(front, s, rules, found, near)
         if merge_neighbors(surface, front, s, rules, found, near):
             return True
         return close_quadrangle(front, s, rules, found, near)
-    if case == RIGHT:
+    if case == CASE_5:
         return close_right(front, s, rules, found, near)
-    if case == LEFT:
+    if case == CASE_6:
         return close_left(front, s, rules, found, near)
     return new_node(surface, front, s, rules, found, near, patch)

@@ -19,7 +19,7 @@ from ..surface.local_surface import onto_patch
 from .grid import AT_REST, INTERIOR, ON_CURVE, Net
 
 FOUR_ROOT_3 = 4.0 * math.sqrt(3.0)  # makes the shape quality of a regular triangle 1 (Eq. 5)
-RELAXATION = 1.4  # over-relaxation: length of a step in that to the least energy of a node whose neighbours rest
+OVER_RELAXATION = 1.4  # over-relaxation: length of a step in that to the least energy of a node whose neighbours rest
 PATCH_REACH = 0.8  # distance from the centre of its patch beyond which a node is not moved [member lengths]
 SHORTEST_STEP = 1e-4  # shortest step that is made while nodes settle [member lengths]
 

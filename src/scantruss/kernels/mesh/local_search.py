@@ -9,7 +9,7 @@ import numpy as np
 from ...runtime.jit import kernel
 from ..boundary.curves import Curves, at_arc
 from ..geometry.vectors import cross, dot, norm, row, subtract
-from .equalize import RELAXATION, settle_node
+from .equalize import OVER_RELAXATION, settle_node
 from .grid import (
     ON_CURVE,
     Net,
@@ -37,7 +37,7 @@ SETTLING_SWEEPS = 2  # sweeps in which all nodes around a move settle
 EARLY_ALLOWANCE = (0.35, 1.2, 2.0)
 # growth of the energy by a flip, collapse or split up to which it goes on once all nodes around have settled
 LATE_ALLOWANCE = (0.06, 0.3, 0.5)
-STRAINED = 0.15  # relative deviation of a member from its desired length above which its nodes ask for moves
+STRAINED_MEMBER = 0.15  # relative deviation of a member from its desired length above which its nodes ask for moves
 SHORTEST_SPLIT = 1.05  # length of the shortest member that is split [desired length]
 # length from which on a line between two nodes at rest keeps a node between them [desired length]
 LONGEST_LINE_MEMBER = 1.5
@@ -187,10 +187,10 @@ def try_move(
     for turn in range(1 + SETTLING_SWEEPS):
         for i in range(min(4, scratch.gathered[0]) if turn == 0 else scratch.gathered[0]):
             settle_node(
-                net, patches, curves, scratch.around[i], length, weight, SHORTEST_TRIAL_STEP * length, RELAXATION
+                net, patches, curves, scratch.around[i], length, weight, SHORTEST_TRIAL_STEP * length, OVER_RELAXATION
             )
         if turn == 0 and added >= 0:
-            settle_node(net, patches, curves, added, length, weight, SHORTEST_TRIAL_STEP * length, RELAXATION)
+            settle_node(net, patches, curves, added, length, weight, SHORTEST_TRIAL_STEP * length, OVER_RELAXATION)
         after = local_energy(net, patches, scratch, length, weight)
         if after > before + (EARLY_ALLOWANCE[move] if turn == 0 else LATE_ALLOWANCE[move]):
             break
@@ -211,7 +211,7 @@ def is_regular(net: Net, v: int, length: float) -> bool:
     for i in range(net.degree[v]):
         w = net.ring[v, i]
         size = norm(subtract(row(net.nodes, w), row(net.nodes, v)))
-        if abs(size / target_length(net, v, w, length) - 1.0) > STRAINED:
+        if abs(size / target_length(net, v, w, length) - 1.0) > STRAINED_MEMBER:
             return False
     return True
 

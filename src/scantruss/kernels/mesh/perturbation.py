@@ -10,7 +10,7 @@ import numpy as np
 from ...runtime.jit import kernel
 from ..boundary.curves import Curves
 from ..geometry.vectors import fill_row
-from .equalize import RELAXATION, settle_node
+from .equalize import OVER_RELAXATION, settle_node
 from .grid import LOCKED, Net, place_of, wings
 from .local_search import (
     COLLAPSE,
@@ -36,7 +36,7 @@ SEARCH_ROUNDS = 2  # most rounds of settling and searching
 AREA_SWEEPS = 2  # sweeps in which the area settles in a round
 ALLOWANCE_SETTLED = 2.2  # energy that random moves may cost once the area has settled; what costs more never pays
 ALLOWANCE_SEARCHED = 0.2  # energy that they may cost once the area has been searched; what costs more hardly ever pays
-LISTED, UNFIT, OUT_OF_BOUNDS = 0, 1, 2  # what became of listing an area
+AREA_LISTED, AREA_UNFIT, AREA_OUT_OF_BOUNDS = 0, 1, 2  # what became of listing an area
 
 
 class Area(NamedTuple):
@@ -75,7 +75,7 @@ def random_choice(area: Area, choices: int) -> int:
 
 @kernel
 def list_area(net: Net, patches: np.ndarray, area: Area, v: int) -> int:
-    """Save the nodes around a node: LISTED, UNFIT if there are too many or a defect is among them, or OUT_OF_BOUNDS if one is."""
+    """Save the nodes around a node; AREA_UNFIT if there are too many or a defect is among them, AREA_OUT_OF_BOUNDS if one is."""
     area.number[0] += 1
     stamp = area.number[0]
     area.around[0] = v
@@ -85,16 +85,16 @@ def list_area(net: Net, patches: np.ndarray, area: Area, v: int) -> int:
         u = area.around[at]
         at += 1
         if area.out[u] == 1:
-            return OUT_OF_BOUNDS
+            return AREA_OUT_OF_BOUNDS
         if net.kind[u] == LOCKED:
-            return UNFIT
+            return AREA_UNFIT
         if area.away[u] == AREA_RINGS:
             continue
         for i in range(net.degree[u]):
             w = net.ring[u, i]
             if area.mark[w] != stamp:
                 if count == len(area.around):
-                    return UNFIT
+                    return AREA_UNFIT
                 area.mark[w], area.away[w] = stamp, area.away[u] + 1
                 area.around[count] = w
                 count += 1
@@ -112,7 +112,7 @@ def list_area(net: Net, patches: np.ndarray, area: Area, v: int) -> int:
     area.spare[0], area.saved[0] = free, min(free, SAVED_FREE_NODES)
     for k in range(area.saved[0]):
         area.free[k] = net.free[free - 1 - k]
-    return LISTED
+    return AREA_LISTED
 
 
 @kernel
@@ -207,7 +207,7 @@ def settle_area(net: Net, patches: np.ndarray, curves: Curves, area: Area, lengt
             listed = k < area.gathered[0]
             v = area.around[k] if listed else added_node(net, area, k - area.gathered[0])
             if v >= 0 and net.degree[v] > 0 and area.away[v] < AREA_RINGS:
-                settle_node(net, patches, curves, v, length, weight, SHORTEST_TRIAL_STEP * length, RELAXATION)
+                settle_node(net, patches, curves, v, length, weight, SHORTEST_TRIAL_STEP * length, OVER_RELAXATION)
 
 
 @kernel
@@ -345,11 +345,11 @@ def perturb_all(
     for v in range(net.in_use[0]):
         if not waiting[v] or area.out[v] == 1:
             continue
-        listed = UNFIT
+        listed = AREA_UNFIT
         if net.degree[v] > 0 and net.degree[v] != net.ideal[v]:
             listed = list_area(net, patches, area, v)
-        waiting[v] = listed == OUT_OF_BOUNDS
-        if listed == LISTED:
+        waiting[v] = listed == AREA_OUT_OF_BOUNDS
+        if listed == AREA_LISTED:
             worth = share + price * (strain - 0.5 * (free - net.spare[0]) / count)
             perturb(
                 net, patches, curves, scratch, area, length, weight, worth, 0.25 * price / count, temperature, allowance

@@ -10,7 +10,8 @@ from ...runtime.jit import kernel
 from ..geometry.boxes import SearchBoxes, nearest, search
 from ..geometry.vectors import Vector, cross, dot, row, subtract
 
-MOTION = 6  # numbers of a motion: three of rotation, three of translation; in the sums of a step the residual follows
+# numbers of a motion: three of rotation, three of translation; in the sums of a step the residual follows
+MOTION_NUMBERS = 6
 SLOPE_OF_PAIR = 0.6  # cosine of the angle between the normals of two places above which they make a pair
 SAME_SLOPE = 0.75  # cosine of the angle between two surfaces above which they agree
 OTHER_SIDE = -0.2  # cosine of that angle below which a point lies on the other side of a thin body
@@ -112,10 +113,10 @@ def _add(sums: np.ndarray, arm: Vector, d: Vector, n: Vector, m: Vector, sharp: 
         t = cross(arm, a)
         rest = dot(a, d)
         w = weight * stiffness
-        for i in range(MOTION + 1):
-            u = rest if i == MOTION else (t[i] if i < 3 else a[i - 3])
-            for j in range(MOTION + 1):
-                v = rest if j == MOTION else (t[j] if j < 3 else a[j - 3])
+        for i in range(MOTION_NUMBERS + 1):
+            u = rest if i == MOTION_NUMBERS else (t[i] if i < 3 else a[i - 3])
+            for j in range(MOTION_NUMBERS + 1):
+                v = rest if j == MOTION_NUMBERS else (t[j] if j < 3 else a[j - 3])
                 sums[i, j] += w * u * v
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...runtime.jit import kernel
 
-STEPS = 4294967296.0  # along the side of a box; 2**31 points fit into a box
+STEPS_OF_BOX = 4294967296.0  # along the side of a box; 2**31 points fit into a box
 FARTHEST_BOX = 4503599627370496.0  # boxes from the zero of the frame; beyond, a box is finer than float64
 COUNT, SUMS = 3, 4  # columns of a row, behind the three numbers of the box
 LARGEST_INT64 = 9223372036854775807  # int64
@@ -85,7 +85,7 @@ def new_row(table: BoxTable, slot: int, i: int, j: int, k: int) -> int:
 @kernel
 def step_in_box(t: float, i: int) -> int:
     """Place t along a side [box] as steps from the lower corner of box i."""
-    return min(int((t - i) * STEPS + 0.5), 4294967295)
+    return min(int((t - i) * STEPS_OF_BOX + 0.5), 4294967295)
 
 
 @kernel
@@ -152,7 +152,7 @@ def middles(rows: np.ndarray, size: float, means: np.ndarray) -> None:
     """Mean of the points of each row, into (C, 3) [scan unit]."""
     for row in range(len(rows)):
         for c in range(3):
-            means[row, c] = (rows[row, c] + rows[row, SUMS + c] / (STEPS * rows[row, COUNT])) * size
+            means[row, c] = (rows[row, c] + rows[row, SUMS + c] / (STEPS_OF_BOX * rows[row, COUNT])) * size
 
 
 @kernel

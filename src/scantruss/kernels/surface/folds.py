@@ -16,12 +16,12 @@ from .local_surface import Surface, flood
 
 PLANES_REACH = 0.75  # samples farther from the node do not count [member lengths]
 # 1 - |mean normal|^2 at folds of 23 and 31 degrees; the term begins at one, is whole at the other
-SMOOTH, SHARP = 0.04, 0.07
+SMOOTH_SPREAD, SHARP_SPREAD = 0.04, 0.07
 FAR_ENERGY = 0.5  # energy of a place far off the planes
-STRENGTH = 15.0  # energy of a place one member length off the planes
-CLING = 0.03  # of a node to the rounded surface when it goes to the crest of a fold
-CHORD = 12.0  # energy of the middle of a member that lies one length off the surface
-SAG = 0.06  # distance of that middle from a surface that bends gently [member lengths]
+PLANES_WEIGHT = 15.0  # energy of a place one member length off the planes
+CLING_WEIGHT = 0.03  # of a node to the rounded surface when it goes to the crest of a fold
+CHORD_WEIGHT = 12.0  # energy of the middle of a member that lies one length off the surface
+GENTLE_SAG = 0.06  # distance of that middle from a surface that bends gently [member lengths]
 LONGEST_WAY_TO_CREST = 0.25  # way to a crest, at most [member lengths]
 FACING_AWAY = -0.3  # samples that face farther away than this are another side's
 
@@ -57,7 +57,7 @@ def add_fold(surface: Surface, patch: np.record, members: float, strength: float
     if total <= 0.0:
         return
     spread = 1.0 - (mx * mx + my * my + mz * mz) / (total * total)
-    share = (spread - SMOOTH) / (SHARP - SMOOTH)
+    share = (spread - SMOOTH_SPREAD) / (SHARP_SPREAD - SMOOTH_SPREAD)
     if share <= 0.0:
         return
     put_vector(patch.fold_squares[:3], (xx / total, xy / total, xz / total))
@@ -71,7 +71,7 @@ def add_fold(surface: Surface, patch: np.record, members: float, strength: float
 def onto_crest(surface: Surface, patch: np.record, place: Vector) -> Vector:
     """Place on the crest of a fold or in its corner near a place on the rounded surface; the same place where there is no fold.
 
-    The least of the quadric with CLING times the squared distance moved; the way is at most LONGEST_WAY_TO_CREST.
+    The least of the quadric with CLING_WEIGHT times the squared distance moved; the way is at most LONGEST_WAY_TO_CREST.
     """
     local = surface.length * surface.field[patch.sample]
     x, y, z = subtract(place, vector_of(patch.centre))
@@ -81,7 +81,7 @@ def onto_crest(surface: Surface, patch: np.record, place: Vector) -> Vector:
     xx, xy, xz, yy, yz, zz = coefficients_of(patch.fold_squares)
     bx, by, bz = vector_of(patch.fold_linear)
     p, q, r = bx - (xx * x + xy * y + xz * z), by - (xy * x + yy * y + yz * z), bz - (xz * x + yz * y + zz * z)
-    a, b, c, d, e, f = xx + CLING, xy, xz, yy + CLING, yz, zz + CLING
+    a, b, c, d, e, f = xx + CLING_WEIGHT, xy, xz, yy + CLING_WEIGHT, yz, zz + CLING_WEIGHT
     first, second, third = d * f - e * e, c * e - b * f, b * e - c * d  # row of the adjugate
     det = a * first + b * second + c * third
     step = (
@@ -100,7 +100,7 @@ def fold_energy(patches: np.ndarray, v: int, x: float, y: float, z: float) -> fl
     """Energy of a place off the planes around node v, at most FAR_ENERGY; nothing where the surface is smooth."""
     if patches[v].fold_weight == 0.0:
         return 0.0
-    k = STRENGTH * patches[v].fold_weight / patches[v].desired ** 2
+    k = PLANES_WEIGHT * patches[v].fold_weight / patches[v].desired ** 2
     x, y, z = subtract((x, y, z), vector_of(patches[v].centre))
     xx, xy, xz, yy, yz, zz = coefficients_of(patches[v].fold_squares)
     bx, by, bz = vector_of(patches[v].fold_linear)
@@ -118,7 +118,7 @@ def fold_slope(patches: np.ndarray, v: int, x: float, y: float, z: float) -> tup
     """Gradient of `fold_energy`."""
     if patches[v].fold_weight == 0.0:
         return 0.0, 0.0, 0.0
-    k = 2.0 * STRENGTH * patches[v].fold_weight / patches[v].desired ** 2
+    k = 2.0 * PLANES_WEIGHT * patches[v].fold_weight / patches[v].desired ** 2
     f = 1.0 - fold_energy(patches, v, x, y, z) / FAR_ENERGY
     k *= f * f
     x, y, z = subtract((x, y, z), vector_of(patches[v].centre))
@@ -138,9 +138,12 @@ def chord_energy(patches: np.ndarray, v: int, w: int, x: float, y: float, z: flo
         return 0.0
     first, second = _height(patches, v, x, y, z)[0], _height(patches, w, x, y, z)[0]
     q = (
-        CHORD
+        CHORD_WEIGHT
         * max(patches[v].fold_weight, patches[w].fold_weight)
-        * (0.5 * (first * first + second * second) / max(patches[v].desired, patches[w].desired) ** 2 - SAG * SAG)
+        * (
+            0.5 * (first * first + second * second) / max(patches[v].desired, patches[w].desired) ** 2
+            - GENTLE_SAG * GENTLE_SAG
+        )
     )
     return q * FAR_ENERGY / (q + FAR_ENERGY) if q > 0.0 else 0.0
 
@@ -155,7 +158,7 @@ def chord_slope(patches: np.ndarray, v: int, w: int, x: float, y: float, z: floa
     k = (
         f
         * f
-        * CHORD
+        * CHORD_WEIGHT
         * max(patches[v].fold_weight, patches[w].fold_weight)
         / max(patches[v].desired, patches[w].desired) ** 2
     )

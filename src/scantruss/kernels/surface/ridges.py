@@ -30,16 +30,16 @@ FOLD = record_type(
     gain=np.float64,  # over a smooth surface (F statistic)
     off=np.float64,  # rms distance of the points [scan unit]
 )
-ROUNDINGS = (0.0, 0.12, 0.25, 0.4)  # w of the folds that are tried [member lengths]
-CLEARLY = 0.9  # share of the error of a sharper fold below which one that is more rounded is taken
+ROUNDINGS_TRIED = (0.0, 0.12, 0.25, 0.4)  # w of the folds that are tried [member lengths]
+CLEARLY_BETTER = 0.9  # share of the error of a sharper fold below which one that is more rounded is taken
 FIRST_ROUNDING = 0.12  # w while the line is looked for [member lengths]
-SHIFTS, TURNS = 5, 5  # lines tried across and around in each round
+SHIFTS_TRIED, TURNS_TRIED = 5, 5  # lines tried across and around in each round
 # how far the outermost of them lie from the middle one in the first round [radius, radian], and by how much they close up with each
 FIRST_SHIFT, FIRST_TURN, NARROWED = 0.4, 0.35, 0.4
 # rounds in which the line is looked for with the first rounding; all, then sharp and as it is rounded
-SEARCHES, FOLD_FITS = 2, 5
-NEAR = 0.375  # points nearer to the line than this are left out where its sides are measured: a fold may be rounded [radius]
-MIDDLE_OF_SIDES = 0.5 * (1.0 + NEAR)  # of the points that are taken [radius]
+ROUNDED_FITS, FOLD_FITS = 2, 5
+NEAR_THE_LINE = 0.375  # points nearer to the line than this are left out where its sides are measured: a fold may be rounded [radius]
+MIDDLE_OF_SIDES = 0.5 * (1.0 + NEAR_THE_LINE)  # of the points that are taken [radius]
 # how far from the line the sides of a rounded fold may meet, at least and at most [radius]
 LEAST_MEETING, FARTHEST_MEETING = 0.2, 0.4
 SHARP_ENOUGH = 0.7  # angle of a fold from which the place where its sides meet is certain enough [radian]
@@ -159,7 +159,7 @@ def flank(
 
     Its direction and how much it bends [radian]; how far across and how high its middle is [radius].
 
-    crest : place of the line across and its height [radius]. Taken are the points between NEAR and 1 radius from it.
+    crest : place of the line across and its height [radius]. Taken are the points between NEAR_THE_LINE and 1 radius from it.
     """
     c, e, n = frame
     term = np.empty(TERMS_OF_SIDE)
@@ -169,7 +169,7 @@ def flank(
         d = vector_of(buffer[i].place)
         u, h = side * (dot(d, c) / radius - crest[0]), dot(d, n) / radius - crest[1]
         s = math.sqrt(u * u + h * h)
-        if u > 0.0 and NEAR < s < 1.0:
+        if u > 0.0 and NEAR_THE_LINE < s < 1.0:
             points += 1
             s -= MIDDLE_OF_SIDES
             term[0], term[1], term[2], term[3] = 1.0, s, s * s, dot(d, e) / radius
@@ -262,9 +262,9 @@ def best_rounding(
 ) -> tuple[float, float]:
     """Error of the folds along a line of the sharpest rounding that fits, and that rounding [radius]; member : its length [radius]."""
     least, best = np.inf, 0.0
-    for w in ROUNDINGS:
+    for w in ROUNDINGS_TRIED:
         error = turned_fold_error(points, squares, angle, shift, w * member)
-        if error < CLEARLY * least:
+        if error < CLEARLY_BETTER * least:
             least, best = error, w * member
     return least, best
 
@@ -293,20 +293,20 @@ def fit_fold(
     least = np.inf
     rounding = FIRST_ROUNDING * surface.length / radius
     for turn in range(FOLD_FITS):
-        if turn == SEARCHES and least < np.inf:
+        if turn == ROUNDED_FITS and least < np.inf:
             rounding = 0.0
             least = turned_fold_error(points, squares, angle, shift, rounding)
         if turn == FOLD_FITS - 1 and least < np.inf:
             least, rounding = best_rounding(points, squares, angle, shift, surface.length / radius)
         at_angle, at_shift = angle, shift
-        for i in range(TURNS):
-            for j in range(SHIFTS):
-                a = at_angle + swing * (2.0 * i / (TURNS - 1) - 1.0)
-                b = at_shift + reach * (2.0 * j / (SHIFTS - 1) - 1.0)
+        for i in range(TURNS_TRIED):
+            for j in range(SHIFTS_TRIED):
+                a = at_angle + swing * (2.0 * i / (TURNS_TRIED - 1) - 1.0)
+                b = at_shift + reach * (2.0 * j / (SHIFTS_TRIED - 1) - 1.0)
                 error = turned_fold_error(points, squares, a, b, rounding)
                 if error < least:
                     least, angle, shift = error, a, b
-        if turn != SEARCHES:  # a sharp fold may lie a little beside
+        if turn != ROUNDED_FITS:  # a sharp fold may lie a little beside
             reach, swing = NARROWED * reach, NARROWED * swing
     if least == np.inf:
         return False

@@ -17,13 +17,14 @@ TIE_TOLERANCE = 1e-6  # relative difference below which two squared distances co
 SIDE_OF_GROOVE = 0.3  # cosine of the normals of two samples below which they may be the sides of a groove
 LOOKS_ACROSS = 0.2  # cosine between a normal and the way to the other side above which a sample looks at it; share of it that is deeper
 ONE_SIDE = 0.3  # cosine of the normals of two samples on one side of a groove
-OPPOSITE = -0.7  # cosine of the normals given with two points below which they lie on opposite sides of something thin
+# cosine of the normals given with two points below which they lie on opposite sides of something thin
+OPPOSITE_COSINE = -0.7
 
 
 @kernel
 def may_share_sheet(facing: np.ndarray, p: int, q: int) -> bool:
     """Whether two points do not face opposite ways; facing (N, 3) normals given with the points, (0, 3) where none are."""
-    return len(facing) == 0 or dot(row(facing, p), row(facing, q)) > OPPOSITE
+    return len(facing) == 0 or dot(row(facing, p), row(facing, q)) > OPPOSITE_COSINE
 
 
 @kernel

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ...structure.checks import CLAUSES, MemberChecks, span_of, use_words
+from ...structure.checks import CLAUSES_CHECKED, MemberChecks, span_of, use_words
 from ...structure.options import StructureSettings
 from ...structure.report import StructureReport
 from ...structure.truss import Truss
@@ -16,7 +16,7 @@ from .words import load_words, support_words
 
 CLAUSES_USED = (
     ("EN 1993-1-1 table 5.2", "class of the section"),
-    *((f"EN 1993-1-1 {clause.partition(' ')[0]}", clause.partition(" ")[2]) for clause in CLAUSES),
+    *((f"EN 1993-1-1 {clause.partition(' ')[0]}", clause.partition(" ")[2]) for clause in CLAUSES_CHECKED),
     ("EN 1990 6.10, table A1.2(B)", "ULS, psi 0 of table A1.1"),
     ("EN 1990 6.14b", "SLS, characteristic"),
 )

@@ -16,7 +16,7 @@ from .doubt import leave_out_doubtful
 from .features import find_features
 from .fine import Fit, align
 from .graph import (
-    CONTRADICTION,
+    CONTRADICTING_AGREEMENT,
     Group,
     agree_on_pose,
     assemble,
@@ -59,13 +59,16 @@ class Splice:
     @property
     def contradicting(self) -> tuple[PairFit, ...]:
         """Pairs that overlap without agreeing; only with poses used as given."""
-        return tuple(pair for pair in self.pairs if pair.agreement < CONTRADICTION)
+        return tuple(pair for pair in self.pairs if pair.agreement < CONTRADICTING_AGREEMENT)
 
     @property
     def alone(self) -> tuple[str, ...]:
         """Scans that agree with no other; only with poses used as given."""
         agreeing = {
-            name for pair in self.pairs if pair.agreement >= CONTRADICTION for name in (pair.first, pair.second)
+            name
+            for pair in self.pairs
+            if pair.agreement >= CONTRADICTING_AGREEMENT
+            for name in (pair.first, pair.second)
         }
         return tuple(name for name in self.poses if name not in agreeing)
 

@@ -26,10 +26,10 @@ from ...kernels.scan.thinning import (
     take_nearest,
 )
 from ...runtime.parallel import run_in_parts
-from ..checks import CAUSE
+from ..checks import LIKELY_CAUSE
 
 FIRST_ROWS = 4096  # rows of a new table
-GROWTH = 1.5  # factor by which a full table grows
+TABLE_GROWTH = 1.5  # factor by which a full table grows
 BOXES_PER_THREAD = 20_000  # fewest boxes that are worth a thread
 
 
@@ -87,7 +87,7 @@ class Thinning:
             most = np.abs(points[np.isfinite(points).all(axis=1)]).max(initial=0.0)
             raise InputError(
                 f"spacing {self.spacing:g} is too small for points so far from zero, up to {most:.3g}; use a larger one, or where"
-                f" no part of the scan lies there {CAUSE} (--crop leaves these out)"
+                f" no part of the scan lies there {LIKELY_CAUSE} (--crop leaves these out)"
             )
         self.points += len(points)
 
@@ -103,7 +103,7 @@ class Thinning:
         """Make room for more boxes; old arrays are released as early as possible."""
         slots, rows, extremes, counters = self._table
         del self._table
-        count, capacity = int(counters[ROWS]), int(GROWTH * len(rows))
+        count, capacity = int(counters[ROWS]), int(TABLE_GROWTH * len(rows))
         few = _slots_for(capacity) > len(slots)
         if few:
             del slots
