@@ -17,6 +17,7 @@ from ..kernels.front.candidate_nodes import CandidateNodes
 from ..runtime.progress import Progress, seer_of
 from ..runtime.watch import Watch
 from ..settings import Settings
+from ..surface.pieces import TRIANGLE_AREA
 from ..surface.samples import SurfaceSamples
 from .start import grown, new_front, start_front
 
@@ -129,7 +130,7 @@ def run(
     front: lists.Front, samples: SurfaceSamples, rules: lists.Rules, progress: Progress | None, step: Callable[..., int]
 ) -> lists.Front:
     """Advance by slices of a kernel (`step`) until no active segment is left; arrays grow as needed."""
-    expected = samples.graded_area / (0.433 * rules.desired**2)
+    expected = samples.graded_area / (TRIANGLE_AREA * rules.desired**2)
     watch, made = Watch(RUNS_OVER_ITSELF, expected, MOST_TRIANGLES_MADE), int(front.counts.triangles)
     watch.note(made, samples.origin)
     see = seer_of(progress)

@@ -27,6 +27,7 @@ from ..kernels.surface.local_surface import (
 from ..kernels.surface.ridges import mean_normal
 from ..runtime.jit import new_record
 from ..settings import Settings
+from ..surface.pieces import TRIANGLE_AREA
 from ..surface.samples import SurfaceSamples, local_field
 from .orientation_field import nodes_at
 
@@ -35,11 +36,16 @@ FIXED_CLEARANCE = 0.33  # least distance of a fixed position from the initial fr
 SIDE_REACH = 0.6  # how far the sides of a ridge are looked at [member lengths]
 # size d_B of the search boxes of the nodes (Eq. 1): as far as one step of the front looks [member lengths]
 NODE_BOX = 2.4
+MORE_NODES = 2000  # nodes that there is room for at first beyond twice those of regular triangles
+# a seed of candidate nodes: how many of the nearest are tried, how far they may be [member lengths], how they must face, and how
+# good the triangle must be
+SEED_NODES, SEED_REACH, SEED_FACING, SEED_QUALITY = 12, 2.0, 0.5, 0.8
 
 
 def new_front(samples: SurfaceSamples, settings: Settings) -> lists.Front:
     """Return an empty front with room for the cloud."""
-    mean, room = samples.surface.mean, int(2.0 * samples.graded_area / (0.433 * settings.length**2)) + 2000
+    mean = samples.surface.mean
+    room = int(2.0 * samples.graded_area / (TRIANGLE_AREA * settings.length**2)) + MORE_NODES
     usual = settings.length * float(np.sqrt(samples.area / samples.graded_area))
     boxes = new_boxes(mean.min(axis=0), mean.max(axis=0), NODE_BOX * usual, room, room)
     return _blank(room, settings.sharp_edges, boxes)
@@ -172,9 +178,12 @@ def seed_of_candidates(front: lists.Front, surface: Surface, sample: int, length
     count = int(front.counts.nodes)
     free = np.flatnonzero(front.out[:count] < 0)
     away = np.linalg.norm(front.nodes[free] - surface.mean[sample], axis=1)
-    near = free[np.argsort(away, kind="stable")[:12]]
-    near = near[(front.normals[near] @ surface.normals[sample] > 0.5) & (np.sort(away)[: len(near)] < 2.0 * length)]
-    best, ids = 0.8, []
+    near = free[np.argsort(away, kind="stable")[:SEED_NODES]]
+    near = near[
+        (front.normals[near] @ surface.normals[sample] > SEED_FACING)
+        & (np.sort(away)[: len(near)] < SEED_REACH * length)
+    ]
+    best, ids = SEED_QUALITY, []
     for a, b, c in combinations(near.tolist(), 3):
         pa, pb, pc = (tuple(front.nodes[q].tolist()) for q in (a, b, c))
         value = quality(pa, pb, pc, length, 0.5, 0.5)

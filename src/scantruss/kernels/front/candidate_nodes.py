@@ -14,6 +14,9 @@ from ..mesh.point_location import nearest_sample
 from ..surface.local_surface import SURFACE_PATCH, Surface, fit_patch, patch_normal, walk
 from .front import MOST_NEAR_NODES, Front, add_node, propose_node
 
+# distance of a node from its sample above which the nearest is looked for [steps between samples]
+FAR_FROM_SAMPLE = 2.0
+
 
 class CandidateNodes(NamedTuple):
     """Nodes of the position field that a front may attach."""
@@ -33,7 +36,7 @@ def add_still_nodes(front: Front, surface: Surface, nodes: np.ndarray) -> int:
         place = row(nodes, i)
         if sample >= 0:
             sample = walk(surface, sample, place)
-        if sample < 0 or norm(subtract(row(surface.mean, sample), place)) > 2.0 * surface.step:
+        if sample < 0 or norm(subtract(row(surface.mean, sample), place)) > FAR_FROM_SAMPLE * surface.step:
             sample = nearest_sample(surface, place[0], place[1], place[2])
         fit_patch(surface, patch[0], sample, place)
         propose_node(front, place, patch_normal(patch[0], place), patch[0].sample, True)

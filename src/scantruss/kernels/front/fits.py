@@ -37,6 +37,7 @@ LOOSE_ALIGNMENT, STRICT_ALIGNMENT = -0.2, 0.5  # least cosine between a triangle
 LONGEST_EDGE, SHORTER_EDGE = 3.0, 1.2  # longest edge of a triangle; what strictness 1 takes off [member lengths]
 ROOM_BESIDE_EDGE = 0.25  # distance of a node of the front from a new edge at strictness 1 [member lengths]
 NO_SECTOR = 9.0  # stands for the angle of a node outside the unmeshed area; larger than a full turn [radian]
+NO_DIFFERENCE = 1e-9  # distance, and angle, below which two are the same [member lengths, radian]
 
 
 @kernel
@@ -45,7 +46,7 @@ def same_sheet(surface: Surface, front: Front, a: int, q: int, length: float) ->
     d = subtract(row(front.nodes, q), row(front.nodes, a))
     far = norm(d)
     na, nq = row(front.normals, a), row(front.normals, q)
-    if far < 1e-9 * length:
+    if far < NO_DIFFERENCE * length:
         return True
     flat = max(abs(dot(d, na)), abs(dot(d, nq))) / far
     facing = dot(na, nq)
@@ -110,7 +111,7 @@ def _sector(front: Front, leaving: int, q: int) -> float:
     place, normal = row(front.nodes, p), row(front.normals, p)
     base = subtract(row(front.nodes, front.head[leaving]), place)
     whole = angle_from(base, subtract(row(front.nodes, front.tail[front.previous[leaving]]), place), normal)
-    if front.tail[front.previous[leaving]] == front.head[leaving] or whole < 1e-9:
+    if front.tail[front.previous[leaving]] == front.head[leaving] or whole < NO_DIFFERENCE:
         whole = 2.0 * math.pi
     angle = angle_from(base, subtract(row(front.nodes, q), place), normal)
     return angle if angle < whole else NO_SECTOR

@@ -22,6 +22,10 @@ FOUR_ROOT_3 = 4.0 * math.sqrt(3.0)  # makes the shape quality of a regular trian
 OVER_RELAXATION = 1.4  # over-relaxation: length of a step in that to the least energy of a node whose neighbours rest
 PATCH_REACH = 0.8  # distance from the centre of its patch beyond which a node is not moved [member lengths]
 SHORTEST_STEP = 1e-4  # shortest step that is made while nodes settle [member lengths]
+TRIANGLE_STIFFNESS = 1.3  # of the triangles at a node, where that of its members is their weight
+LONGEST_STEP = 0.3  # longest step of a node [member lengths]
+NODE_STEPS, SHORTENED = 2, 0.3  # steps of a node that are tried, each shorter than the one before by this
+WAKES_FROM = 0.1  # share of `enough` from which on the gain of a node wakes its neighbours
 
 
 @kernel
@@ -109,15 +113,15 @@ def settle_node(
         across = gx * nx + gy * ny + gz * nz
         gx, gy, gz = gx - across * nx, gy - across * ny, gz - across * nz
     local = length * net.desired[v]
-    step = stride * local * local / (net.degree[v] * (weight + 1.3))
-    most = 0.3 * local
+    step = stride * local * local / (net.degree[v] * (weight + TRIANGLE_STIFFNESS))
+    most = LONGEST_STEP * local
     size = step * math.sqrt(gx * gx + gy * gy + gz * gz)
     if size < still * net.desired[v]:
         return 0.0
     if size > most:
         step *= most / size
     arc = net.arc[v]
-    for _ in range(2):
+    for _ in range(NODE_STEPS):
         place = (x - step * gx, y - step * gy, z - step * gz)
         if kind == ON_CURVE:
             arc, px, py, pz = slide(curves, net.curve[v], net.arc[v], most, place[0], place[1], place[2])
@@ -125,14 +129,14 @@ def settle_node(
             px, py, pz = onto_patch(patches[v], place)
             d = subtract((px, py, pz), vector_of(patches[v].centre))
             if dot(d, d) > PATCH_REACH * PATCH_REACH * local * local:
-                step *= 0.3
+                step *= SHORTENED
                 continue
         after = star_energy(net, patches, v, px, py, pz, length, weight, False)[0]
         if after < before:
             net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2] = px, py, pz
             net.arc[v] = arc
             return before - after
-        step *= 0.3
+        step *= SHORTENED
     return 0.0
 
 
@@ -162,7 +166,7 @@ def settle_some(
                 awake[v] = 0
                 gained = settle_node(net, patches, curves, v, length, weight, SHORTEST_STEP * length, stride)
                 gain += gained
-                if gained > 0.1 * enough:
+                if gained > WAKES_FROM * enough:
                     awake[v] = 1
                     for i in range(net.degree[v]):
                         awake[net.ring[v, i]] = 1

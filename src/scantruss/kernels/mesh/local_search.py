@@ -43,6 +43,7 @@ SHORTEST_SPLIT = 1.05  # length of the shortest member that is split [desired le
 LONGEST_LINE_MEMBER = 1.5
 LONGEST_COLLAPSED = 1.1  # length of the longest member that is collapsed [desired length]
 SHORTEST_TRIAL_STEP = 0.005  # shortest step that is made in a trial [member lengths]
+LEAST_PAID = 1e-4  # energy that a move must gain
 
 
 @kernel
@@ -194,7 +195,7 @@ def try_move(
         after = local_energy(net, patches, scratch, length, weight)
         if after > before + (EARLY_ALLOWANCE[move] if turn == 0 else LATE_ALLOWANCE[move]):
             break
-    if after < before - 1e-4 and (move != COLLAPSE or triangles_across(net, patches, scratch, length) <= across):
+    if after < before - LEAST_PAID and (move != COLLAPSE or triangles_across(net, patches, scratch, length) <= across):
         for i in range(scratch.gathered[0]):
             scratch.tried[scratch.around[i]] = 0
         scratch.paid[0] += 1

@@ -37,6 +37,11 @@ AREA_SWEEPS = 2  # sweeps in which the area settles in a round
 ALLOWANCE_SETTLED = 2.2  # energy that random moves may cost once the area has settled; what costs more never pays
 ALLOWANCE_SEARCHED = 0.2  # energy that they may cost once the area has been searched; what costs more hardly ever pays
 AREA_LISTED, AREA_UNFIT, AREA_OUT_OF_BOUNDS = 0, 1, 2  # what became of listing an area
+# moves that one is drawn of, and how many of these are flips; then a collapse and a split
+MOVES_DRAWN, FLIPS_DRAWN = 5, 3
+MOST_KEPT_AT_NODE = 20  # most moves that are kept at one node before the next one is searched
+SMALLEST_FALL = 1e-4  # fall of the energy that counts
+CHANCES = 100_000  # numbers that chance is drawn of
 
 
 class Area(NamedTuple):
@@ -188,8 +193,8 @@ def move_at_random(net: Net, patches: np.ndarray, curves: Curves, scratch: Scrat
         if net.degree[a] == 0:
             continue
         b = net.ring[a, random_choice(area, net.degree[a])]
-        kind = random_choice(area, 5)
-        move = FLIP if kind < 3 else (COLLAPSE if kind == 3 else SPLIT)
+        kind = random_choice(area, MOVES_DRAWN)
+        move = FLIP if kind < FLIPS_DRAWN else (COLLAPSE if kind == FLIPS_DRAWN else SPLIT)
         if is_allowed(net, move, a, b, length) and is_within(net, area, a, b):
             gather(net, scratch, a, b)
             added = make_move(net, patches, curves, scratch, move, a, b)
@@ -231,7 +236,7 @@ def search_area(
         if scratch.tried[v] == 1 or is_regular(net, v, length):
             continue
         i = 0
-        while i < 4 * net.degree[v] and kept < 20:  # between two moves that are kept, i rises
+        while i < 4 * net.degree[v] and kept < MOST_KEPT_AT_NODE:  # between two moves that are kept, i rises
             u, way = net.ring[v, i // 4], i % 4
             if way == 0 and scratch.tried[u] == 1:
                 i += 4  # this edge was tried from its other end
@@ -308,7 +313,9 @@ def perturb(
     settle_area(net, patches, curves, area, length, weight)
     after = area_energy(net, patches, scratch, area, length, weight)
     more = area.spare[0] - net.spare[0]
-    luck = -temperature * math.log((random_choice(area, 100000) + 1.0) / 100001.0) if temperature > 0.0 else -1e-4
+    luck = -SMALLEST_FALL
+    if temperature > 0.0:
+        luck = -temperature * math.log((random_choice(area, CHANCES) + 1.0) / (CHANCES + 1.0))
     if after - before < worth * more - bend * more * more + luck:
         area.paid[0] += 1
         return True

@@ -13,6 +13,7 @@ from ..surface.size_field import length_at
 from .grid import AT_REST, INTERIOR, ON_CURVE, Net
 
 FARTHEST_PATCH = 0.5  # distance of a new patch from its node above which it is of another sheet [member lengths]
+SAME_CORNER = 1e-6  # distance from a corner within which a node stands on it [member lengths]
 
 
 @kernel
@@ -72,7 +73,7 @@ def locate_on_boundary(net: Net, curves: Curves, corners: np.ndarray, fixed: np.
         net.curve[v], net.arc[v] = curve, arc
         free = not fixed[v] and net.line[v] == 0
         for k in range(len(corners)):
-            free = free and norm(subtract(row(corners, k), place)) > 1e-6 * length
+            free = free and norm(subtract(row(corners, k), place)) > SAME_CORNER * length
         if free:
             net.kind[v] = ON_CURVE
 

@@ -23,6 +23,7 @@ EQUAL_PATCH_RATIO = 0.85  # ratio of the radii of two patches above which one of
 ROUND_ENOUGH = 0.75  # least roundness of the points of a patch; below it they lie on few scan lines
 CREST_REACH = 0.4  # distance up to which samples count for the crest of a fold [member lengths]
 FEWEST_FOR_WIDE_PATCH = 24  # fewest points of a patch; the noise of fewer, as at a boundary, moves its edge too much
+LONGEST_WAY_TO_SURFACE = 0.6  # longest way of a node to the surface [member lengths]
 
 
 @kernel
@@ -105,7 +106,7 @@ def project_nodes(
             if net.kind[v] != INTERIOR:
                 normal = patch_normal(patches[v], foot)
                 foot = along(place, dot(subtract(foot, place), normal), normal)
-            if fixed[v] or norm(subtract(foot, place)) > 0.6 * local:
+            if fixed[v] or norm(subtract(foot, place)) > LONGEST_WAY_TO_SURFACE * local:
                 break
             net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2] = foot
             if norm(subtract(foot, place)) < SMALL_MOVE * local:

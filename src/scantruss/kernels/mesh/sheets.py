@@ -10,6 +10,7 @@ from ..geometry.vectors import dot, row, subtract
 from ..surface.local_surface import Surface, flood
 
 COST_ACROSS_FOLD = 2.0  # what a distance counts to a node on the other side of a fold of more than 90 degrees
+MOST_SAMPLES_NEAR_NODE = 512  # most samples around a node
 
 
 @kernel
@@ -23,7 +24,7 @@ def nearest_nodes(surface: Surface, boxes: SearchBoxes, nodes: np.ndarray, reach
     """
     nearest[:] = -1
     distance = np.empty(len(nearest))
-    found = np.empty(512, np.int64)
+    found = np.empty(MOST_SAMPLES_NEAR_NODE, np.int64)
     for v in range(len(nodes)):
         place = row(nodes, v)
         near, least = -1, 1e300

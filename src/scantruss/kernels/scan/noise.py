@@ -13,6 +13,9 @@ from ..surface.patches import Patches, fit, foot, gather
 MOST_AROUND = 600  # most points around a place
 RADIUS_RATIO = 1.3  # from one radius to the next narrower one
 NOISE_PATCH_FITS = 2  # fits of a patch, the second with less weight for points off the first
+LEAST_THICKNESS = 1e-9  # of a patch whose points lie exactly on it [radii]
+LEAST_NEARNESS = 1e-3  # weight of a patch at the edge of which a point lies
+OFF_PATCH_SQUARE = 9.0  # squared distance from a patch at which it weighs a quarter [thicknesses]
 
 
 @kernel
@@ -92,9 +95,9 @@ def onto_patches(
             at, normal = foot(patches, number[n], d)
             e = subtract(at, d)
             radius = patches.radius[number[n]]
-            thick = max(patches.rms[number[n]], 1e-9 * radius)
-            near = max(1.0 - dot(d, d) / (radius * radius), 1e-3)
-            off = 1.0 + dot(e, e) / (9.0 * thick * thick)
+            thick = max(patches.rms[number[n]], LEAST_THICKNESS * radius)
+            near = max(1.0 - dot(d, d) / (radius * radius), LEAST_NEARNESS)
+            off = 1.0 + dot(e, e) / (OFF_PATCH_SQUARE * thick * thick)
             weight = near * near / (thick * thick * thick * thick * off * off)
             total += weight
             shift = along(shift, weight, e)

@@ -8,6 +8,8 @@ from ...runtime.jit import kernel
 from ..geometry.kd_tree import STACK_LEVELS, KDTree, nearest
 from ..geometry.vectors import dot, row, subtract
 
+RISE_WEIGHT = 16.0  # of the squared rise over the tangent plane, against the squared distance
+
 
 @kernel
 def turn_like_beside(
@@ -25,7 +27,7 @@ def turn_like_beside(
             other = row(settled, found[k])
             rise = dot(subtract(row(tree.points, found[k]), place), normal)
             agree = dot(normal, other)
-            cost = (squares[k] + 16.0 * rise * rise) * (2.0 - abs(agree))
+            cost = (squares[k] + RISE_WEIGHT * rise * rise) * (2.0 - abs(agree))
             if cost < best:
                 best, side = cost, agree
         if side < 0.0:

@@ -23,6 +23,8 @@ MOST_LOOKED_AT = 512  # most points searched for those
 # sectors around a point on a sheet, and those side by side without any point where it ends
 SECTORS_AROUND, EMPTY_SECTORS = 12, 5
 THICK_CLOUD = 0.2  # thickness, in radii, above which the points around a place form no surface
+FARTHER_AROUND = 8  # times as many points as are needed are looked at, at most, where many are left out
+PATCH_BEYOND_LAST = 1.1  # radius of a patch, in the distance of its last point
 
 
 @kernel
@@ -78,14 +80,15 @@ def stand_off(
     The point itself is left out of its surface. The expected distance grows with the thickness of the points there and with the
     uncertainty of the surface, which is large at a boundary. least : least thickness, as a share of the radius.
     """
-    stack, found, away = np.empty(2 * STACK_LEVELS, np.int64), np.empty(8 * around, np.int64), np.empty(8 * around)
+    room, stack = FARTHER_AROUND * around, np.empty(2 * STACK_LEVELS, np.int64)
+    found, away = np.empty(room, np.int64), np.empty(room)
     buffer, matrix, patches = np.zeros(2 * around, FIT_POINT), np.zeros((6, 7)), empty_patches(1)
     for i in range(begin, end):
         p = which[i]
         off[i] = 0.0
         place = row(tree.points, p)
         taken, radius, most = 0, 0.0, around + around // 4
-        while taken < around and most <= 8 * around:  # farther where many around are left out
+        while taken < around and most <= room:  # farther where many around are left out
             count = nearest(tree, place[0], place[1], place[2], most, stack, found, away)
             taken = 0
             for k in range(count):
@@ -93,7 +96,7 @@ def stand_off(
                     d = subtract(row(tree.points, found[k]), place)
                     put_vector(buffer[taken].place, d)
                     buffer[taken].square = away[k]
-                    radius = 1.1 * math.sqrt(away[k])
+                    radius = PATCH_BEYOND_LAST * math.sqrt(away[k])
                     taken += 1
             most *= 2
         if taken < POINTS_FOR_QUADRIC or radius <= 0.0:

@@ -16,12 +16,13 @@ SLOPE_OF_PAIR = 0.6  # cosine of the angle between the normals of two places abo
 SAME_SLOPE = 0.75  # cosine of the angle between two surfaces above which they agree
 OTHER_SIDE = -0.2  # cosine of that angle below which a point lies on the other side of a thin body
 OVER_PLACE = 1.5  # distance from a place along its surface within which a point lies over it [spacings]
+MOST_PLACES_NEAR_POINT = 256  # most places around a point
 
 
 @kernel
 def first_places(points: np.ndarray, boxes: SearchBoxes, places: np.ndarray, reach: float, owner: np.ndarray) -> None:
     """The first of the places (S, 3) within reach of each point (N, 3), -1 if there is none; boxes : of the places."""
-    found = np.empty(256, np.int64)
+    found = np.empty(MOST_PLACES_NEAR_POINT, np.int64)
     for p in range(len(points)):
         owner[p] = -1
         for f in range(search(boxes, places, points[p, 0], points[p, 1], points[p, 2], reach, found)):

@@ -25,6 +25,7 @@ from ..geometry.quadric import (
 from ..geometry.vectors import Vector, across, along, cross, dot, put_vector, row, smallest_eigenvector, subtract, unit
 
 POINTS_FOR_QUADRIC, POINTS_FOR_PLANE = 10, 5  # fewest points that either is fitted to
+LEAST_FREEDOMS = 0.25  # share of the points that the coefficients of a patch leave free at least
 
 
 class Patches(NamedTuple):
@@ -135,7 +136,7 @@ def _rms(buffer: np.ndarray, taken: int, size: int) -> float:
     if total <= 0.0:
         return math.inf
     many = total * total / weights
-    return math.sqrt(squares / total * many / max(many - size, 0.25 * many))
+    return math.sqrt(squares / total * many / max(many - size, LEAST_FREEDOMS * many))
 
 
 @kernel

@@ -18,6 +18,8 @@ DEVIATION_ASIDE = 14.0  # its relative growth with the squared distance of the m
 RMS_OVER_MEAN = 1.25  # standard deviation of a normal distribution in its mean absolute deviation
 BLENDED_LENGTHS = 12  # given lengths that count at a place; the next nearest shows how far away a length counts
 SEARCH_GROWTHS = 90  # times that a search radius grows by half at most: from any box to all of them
+REACH_SHRINKS, BLEND_REACH_GROWS = 0.7, 1.5  # a search begins with this share of the last reach, and grows by this
+FEWEST_FOR_CURVATURE = 10  # fewest points of a patch whose curvature counts
 
 
 @kernel
@@ -98,12 +100,12 @@ def blend_lengths(
     wanted = min(BLENDED_LENGTHS + 1, len(given))
     for s in range(len(places)):
         place = row(places, s)
-        reach *= 0.7
+        reach *= REACH_SHRINKS
         count = search(boxes, given, place[0], place[1], place[2], reach, found)
         for _ in range(SEARCH_GROWTHS):
             if count >= wanted:
                 break
-            reach *= 1.5
+            reach *= BLEND_REACH_GROWS
             count = search(boxes, given, place[0], place[1], place[2], reach, found)
         kept = 0
         for i in range(count):
@@ -177,5 +179,5 @@ def measure_curvatures(
         curvatures[i] = _largest_curvature(patch[0])
         spread = CURVATURE_DEVIATION * (1.0 + DEVIATION_ASIDE * aside * aside) * RMS_OVER_MEAN * patch[0].mean_distance
         deviations[i] = spread / (surface.patch_radius * surface.patch_radius * math.sqrt(max(taken, 1)))
-        if taken < 10:
+        if taken < FEWEST_FOR_CURVATURE:
             deviations[i] = np.inf
