@@ -30,6 +30,11 @@ class Constraints:
     positions: np.ndarray  #: (K, 3) places of fixed nodes, relative to the cloud's origin [scan unit]
     lines: Lines = NO_LINES  #: fixed lines and ridges
 
+    def __repr__(self) -> str:
+        """Say how many there are of each."""
+        ridges = sum(whole.ridge for whole in self.lines.whole)
+        return f"Constraints({len(self.positions)} fixed nodes, {len(self.lines.whole) - ridges} fixed lines, {ridges} ridges)"
+
 
 def find_constraints(
     samples: SurfaceSamples, boundary: Boundary, settings: Settings, faults: Sequence[Place] = ()

@@ -95,10 +95,15 @@ class Settings(
             f"settings must be Settings, as in Settings(length=1.5), got {type(given).__name__} {given!r:.40}"
         )
 
+    @property
+    def chosen(self) -> dict[str, Any]:
+        """The settings that are not the default."""
+        own = {spec.name: getattr(self, spec.name) for spec in fields(self)}
+        return {spec.name: own[spec.name] for spec in fields(self) if own[spec.name] != spec.default}
+
     def __repr__(self) -> str:
         """Name the settings that are not the default."""
-        own = [spec.name for spec in fields(self) if getattr(self, spec.name) != spec.default]
-        return f"Settings({', '.join(f'{name}={getattr(self, name)!r}' for name in own)})"
+        return f"Settings({', '.join(f'{name}={value!r}' for name, value in self.chosen.items())})"
 
     @property
     def selection(self) -> Selection:

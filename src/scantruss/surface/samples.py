@@ -87,6 +87,11 @@ class SurfaceSamples:
     #: (2, 3) the box around the points that were not read since a crop left them out, by its words, in the scan's own frame
     cropped: tuple[tuple[str, np.ndarray], ...] = ()
 
+    def __repr__(self) -> str:
+        """Say how many samples and pieces there are."""
+        found = f"{len(self.surface.mean):,} samples of {len(self.scan):,} points"
+        return f"SurfaceSamples({found}, pieces {len(self.pieces)}, area {self.area:.4g} {self.unit or 'unit'}^2)"
+
     @property
     def outliers(self) -> int:
         """Number of outliers that were left out."""

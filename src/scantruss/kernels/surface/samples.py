@@ -214,9 +214,8 @@ def nearest_samples(
         x, y, z = row(positions, s)
         reach = near
         count = _alike(search(boxes, positions, x, y, z, reach, found), found, facing, s)
-        while (count < k + 1 and reach < far) or (
-            count < ENOUGH_NEIGHBORS + 1 and reach < 2.0 * far
-        ):  # the reach, never 0, grows by half
+        most = max(k, ENOUGH_NEIGHBORS)
+        while count <= most and reach < (far if count > ENOUGH_NEIGHBORS else 2.0 * far):  # the reach, never 0, grows
             reach = min(SAMPLE_REACH_GROWS * reach, far if reach < far else 2.0 * far)
             count = _alike(search(boxes, positions, x, y, z, reach, found), found, facing, s)
         held = 0
