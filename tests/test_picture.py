@@ -17,7 +17,7 @@ from typed import known, xyz
 import scantruss as st
 from scantruss.export.drawing.camera import choose_camera, map_depth
 from scantruss.export.drawing.left_out import LEFT_OUT_COLOUR, NO_GRID_COLOUR, OUT_OF_REACH_COLOUR, shown_points
-from scantruss.export.drawing.legend import FAULT_COLOUR, marks_of, round_bar, scale_bar
+from scantruss.export.drawing.legend import FAULT_COLOUR, places_marked, round_bar, scale_bar
 from scantruss.export.drawing.picture import PANELS_SIZE, PICTURE_SIZE, draw_panels, encode_picture
 from scantruss.export.drawing.sheet import PICTURE_OF_SHEET, encode_sheet
 from scantruss.export.drawing.strokes import FIXED_NODE_COLOUR, PAPER_COLOUR
@@ -277,7 +277,7 @@ def test_places_of_faults_and_warnings_are_marked_with_their_words() -> None:
         ("reach", "pieces", "scan_pieces", "boundary_loops", "scan_loops", "euler", "handles"), 1
     )
     found = Certificate(unit="", manifold=True, orientable=True, **nothing, faults=(fault,), warnings=(warning,))
-    assert [mark.words for mark in marks_of(grid.replace(certificate=found))] == [fault.words, warning.words]
+    assert [mark.words for mark in places_marked(grid.replace(certificate=found))] == [fault.words, warning.words]
     plain, marked = (pixels(encode_picture(g)) for g in (grid, grid.replace(certificate=found)))
     assert has_colour(marked, FAULT_COLOUR) > 20 + has_colour(plain, FAULT_COLOUR)
 

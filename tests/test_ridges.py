@@ -16,7 +16,7 @@ from typed import known
 from scantruss import Grid, PointCloud, Settings, grid_from_points
 from scantruss.check.certify import Judged, judge
 from scantruss.constraints.find import wanted_ridges
-from scantruss.constraints.fold_tracing import Tracer, is_even, parts_of
+from scantruss.constraints.fold_tracing import Tracer, is_even, parts_of_fold
 from scantruss.constraints.ridge_ends import Ridge, join_ends
 from scantruss.constraints.ridges import find_ridges
 from scantruss.errors import FrontError
@@ -184,9 +184,9 @@ def test_what_bends_evenly_is_even() -> None:
 def test_lines_of_folds_are_parted_at_their_corners() -> None:
     line = folds(40)
     line["place"][20:, :2] = [4.75, 0.0] + 0.25 * np.arange(1, 21)[:, None] * [np.cos(0.9), np.sin(0.9)]
-    first, last = parts_of(line)
+    first, last = parts_of_fold(line)
     assert np.allclose(first["place"][-1], [4.75, 0.0, 0.0], atol=0.26) and len(first) + len(last) == 41
-    (whole,) = parts_of(folds(40))
+    (whole,) = parts_of_fold(folds(40))
     assert len(whole) == 40
 
 

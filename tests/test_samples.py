@@ -16,7 +16,7 @@ from scantruss import InputError, PointCloud, Settings, grid_from_points
 from scantruss.kernels.geometry.boxes import new_boxes
 from scantruss.kernels.surface.local_surface import Surface
 from scantruss.kernels.surface.normals import (
-    cut_steep_links,
+    cut_steep_links_of,
     link_weights,
     orient_normals,
     sample_normals,
@@ -268,7 +268,7 @@ def test_links_to_another_sheet_are_cut_and_links_around_a_ridge_stay() -> None:
     mean = np.array([(0, 0, 0), (0, 0, 1), (1, 0, 0), (0.1, 0, -1)], float)
     normals = np.array([up, up, up, side])
     neighbors = np.array([[1, 2, 3], [0, -1, -1], [0, -1, -1], [0, -1, -1]])
-    cut_steep_links(mean, normals, neighbors, 0.75, 0, len(mean))
+    cut_steep_links_of(mean, normals, neighbors, 0.75, 0, len(mean))
     assert neighbors.tolist() == [[2, 3, -1], [-1, -1, -1], [0, -1, -1], [0, -1, -1]]
 
 

@@ -12,7 +12,7 @@ from studio_dome import done, session_of_dome
 import scantruss as st
 from scantruss.cli.main import main
 from scantruss.layouts.trade import COUNTS_TRIED
-from scantruss.studio.outputs import command_of, settings_files
+from scantruss.studio.outputs import command_of_project, settings_files
 from scantruss.studio.session import Session
 from scantruss.studio.state import Trade
 from scantruss.studio.trade_tool import curve_of, words_of_present
@@ -52,7 +52,7 @@ def test_what_is_taken_of_the_trade_is_what_the_command_line_makes(
     monkeypatch.chdir(tmp_path)
     for name, content in settings_files(session.state).items():
         Path(name).write_bytes(content)
-    commands = [line for line in command_of(session.state).splitlines() if not line.startswith("#")]
+    commands = [line for line in command_of_project(session.state).splitlines() if not line.startswith("#")]
     assert len(commands) == 2 and f"--parts {parts}" in commands[1]
     for line in commands:
         assert main(line.split()[1:]) == 0

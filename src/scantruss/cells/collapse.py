@@ -24,7 +24,7 @@ class LatticeMesh:
     source: np.ndarray  #: (V,) int64 node of the fine mesh that each was
 
 
-def collapse(mesh: FineMesh, places: np.ndarray, ways: np.ndarray) -> LatticeMesh:
+def collapse_to_lattice(mesh: FineMesh, places: np.ndarray, ways: np.ndarray) -> LatticeMesh:
     """Return the fine mesh with all edges collapsed that join nodes of one lattice node.
 
     Parameters

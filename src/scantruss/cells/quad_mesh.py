@@ -93,22 +93,12 @@ class QuadMesh:
             self.net, quads, share, of, start, some, lengths, angles, sweeps, stride, enough,
         )  # fmt: skip
 
-    def energies(
-        self,
-        quads: np.ndarray,
-        share: np.ndarray | None = None,
-        lengths: float = QUAD_LENGTHS,
-        angles: float = QUAD_ANGLES,
-    ) -> np.ndarray:
-        """Return the energy of each quad (Q,)."""
-        out = np.zeros(len(quads))
-        share = self.shares(quads) if share is None else share
-        energy_of_quads(self.net, quads, share, lengths, angles, out)
-        return out
-
     def mean_energy(self) -> float:
         """Return the mean energy of a quad."""
-        return float(self.energies(self.live()).mean())
+        quads = self.live()
+        out = np.zeros(len(quads))
+        energy_of_quads(self.net, quads, self.shares(quads), QUAD_LENGTHS, QUAD_ANGLES, out)
+        return float(out.mean())
 
     def _enter(self, nodes: Iterable[int]) -> None:
         """Enter the quads at some nodes into the net."""

@@ -142,7 +142,7 @@ class Search:
                     any(self.try_move(move) for move in moves.splits(w))
 
 
-def search_once(search: Search, *, twice: bool) -> float:
+def search_quads_once(search: Search, *, twice: bool) -> float:
     """Try the moves at all irregular nodes once and settle; returns the cost of a quad.
 
     twice : whether moves that cost energy are followed by another

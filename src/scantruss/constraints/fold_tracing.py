@@ -127,7 +127,7 @@ class Tracer:
             ):
                 folds = self._follow(sample, fold, [ridge["place"] for ridge in ridges])
                 self.watch.note(len(folds), folds["place"][-1] + self.origin)
-                even = [part for part in parts_of(folds) if is_even(part, WEAK_FOLD * self.angle, self.sharpest)]
+                even = [part for part in parts_of_fold(folds) if is_even(part, WEAK_FOLD * self.angle, self.sharpest)]
                 even = [part for part in even if not rough or is_clear_on_rough(part, self.angle)]
                 ridges += even
                 misses = 0 if even else misses
@@ -264,7 +264,7 @@ BY_NOISE = 0.2  # change of the bend that noise explains, for the root of the ga
 SURE_GAIN = 25.0  # median gain, at least (F statistic)
 
 
-def parts_of(folds: np.ndarray) -> list[np.ndarray]:
+def parts_of_fold(folds: np.ndarray) -> list[np.ndarray]:
     """The parts (K,) FOLD of a line of folds between its corners, where its direction turns more than before and after."""
     count = len(folds)
     if count < 4 * PLACES_OF_TURN:

@@ -21,7 +21,7 @@ from .drawing_panels import (
     TooManyCyclesError,
     lines_on_no_panel,
     panels_among_lines,
-    place_of,
+    place_in_drawing,
     sides_on_no_line,
     without_diagonals,
 )
@@ -78,7 +78,7 @@ def grid_of_drawing(drawing: Drawing, name: str, merge: float | None = None) -> 
     reach = MERGE_DISTANCE * median if merge is None else merge
     points, number = _merged(drawing, np.unique(pairs), reach)
     if (short := number[pairs[:, 0]] == number[pairs[:, 1]]).any():
-        where = place_of(drawing.points[pairs[short][0, 0]])
+        where = place_in_drawing(drawing.points[pairs[short][0, 0]])
         raise FormatError(
             f"{name} has {short.sum():,} lines or sides no longer than {reach:.3g}, one at {where}; use a smaller --merge"
         )
@@ -95,7 +95,7 @@ def grid_of_drawing(drawing: Drawing, name: str, merge: float | None = None) -> 
         grid = _framework(grid, members, name)
         if len(panels):
             how += f"; {len(loose):,} of its {len(lines):,} lines are on no panel, and members all the same, one at "
-            how += place_of(points[loose[0]].mean(axis=0))
+            how += place_in_drawing(points[loose[0]].mean(axis=0))
     return grid, (f"{name} has no certificate: it was compared with no scan{how}{drawing.left}",)
 
 
@@ -108,7 +108,9 @@ def _surface(
     except TooManyCyclesError as error:
         return np.zeros((0, 3), np.int64), f"; it has no panels, as loads on areas need: {error}"
     if twice := [loop for loop in loops_of(panels) if len(set(loop)) < len(loop)]:
-        raise FormatError(f"{name} has a face that meets itself at {place_of((nodes + origin)[twice[0][0]])}; split it")
+        raise FormatError(
+            f"{name} has a face that meets itself at {place_in_drawing((nodes + origin)[twice[0][0]])}; split it"
+        )
     if not len(panels):
         return panels, "; it has no panels, as loads on areas need"
     grid = _grid(nodes, panels, origin, drawing)
@@ -170,7 +172,7 @@ def _framework(grid: Grid, members: np.ndarray, name: str) -> Framework:
     corners = corners[(corners >= 0).all(axis=1)]
     across = corners[lines_on_no_panel(corners, table)]
     if len(wrong := np.delete(members, lines_on_no_panel(members, across), axis=0)):
-        where = place_of((grid.nodes + grid.origin)[wrong[0]].mean(axis=0))
+        where = place_in_drawing((grid.nodes + grid.origin)[wrong[0]].mean(axis=0))
         raise FormatError(f"{name} has lines across its faces, one at {where}; draw what they divide as faces")
     return Framework(
         nodes=grid.nodes,

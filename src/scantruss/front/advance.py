@@ -61,7 +61,7 @@ def advance_front(
         activate_waiting(front)
         by_cases = settings.method == "paper" and strict == STRICTNESS_OF_ROUNDS[0]  # Table 1, else by quality
         advance = kernels.advance_by_cases if by_cases else kernels.advance
-        front = run(front, samples, rules._replace(strict=strict), progress, advance)
+        front = run_in_slices(front, samples, rules._replace(strict=strict), progress, advance)
     close_gaps(front, samples, settings)
     return grid_of_front(front, members, samples, settings)
 
@@ -126,7 +126,7 @@ def close_gaps(front: lists.Front, samples: SurfaceSamples, settings: Settings) 
                 gaps.cut_out(front, segments)
 
 
-def run(
+def run_in_slices(
     front: lists.Front, samples: SurfaceSamples, rules: lists.Rules, progress: Progress | None, step: Callable[..., int]
 ) -> lists.Front:
     """Advance by slices of a kernel (`step`) until no active segment is left; arrays grow as needed."""

@@ -14,7 +14,7 @@ from ..surface.samples import narrow_surface
 from ..surface.scratch import with_own_scratch
 from .equalize import equalize, finish
 from .fixed_nodes import fix_nearest_nodes, fix_nodes, hold_nodes
-from .flips import flip_by_angle
+from .flips import flip_edges
 from .mend import mend_poor_places
 from .off_scan import put_on_scan
 from .perturbation import search_widely
@@ -105,10 +105,10 @@ def improve_first(
         settings.fold_weight * FOLD_WEIGHT_OF_EFFORT[settings.effort],
     )
     if settings.method == "paper":
-        flip_by_angle(mesh.net)
+        flip_edges(mesh.net)
         if len(constraints.positions):
             fix_nearest_nodes(mesh, constraints.positions)
-            flip_by_angle(mesh.net)
+            flip_edges(mesh.net)
     else:
         hold_nodes(mesh, constraints.positions)
         equalize(mesh, report)

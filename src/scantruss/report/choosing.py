@@ -32,7 +32,7 @@ def head_of(varied: Sequence[str], unit: str) -> tuple[str, ...]:
     return (*varied, *(named.get(figure, figure) for figure in FIGURES), "certificate")
 
 
-def rows_of(trials: Sequence[Trial], outcomes: Sequence[Outcome]) -> list[tuple[str, ...]]:
+def rows_of_designs(trials: Sequence[Trial], outcomes: Sequence[Outcome]) -> list[tuple[str, ...]]:
     """Return a row for each trial; one without a grid says why."""
     none = ("",) * len(FIGURES)
     return [
@@ -93,7 +93,7 @@ def _html_table(table: SweepTable) -> str:
     return "<table>\n" + "\n".join(lines) + "\n</table>\n"
 
 
-def encode_page(
+def encode_choice(
     title: str, tables: Sequence[SweepTable], trials: Sequence[Trial], outcomes: Sequence[Outcome]
 ) -> bytes:
     """Return a page with tables and the pictures, which lie beside it."""

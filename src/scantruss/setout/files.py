@@ -82,10 +82,12 @@ def write_setting_out(made: SettingOut, path: str | Path) -> list[Path]:
     if suffix == ".xlsx":
         return write_files({path: encode_xlsx(made)})
     sheets = make_sheets(made)
-    return write_files({path: encode_dxf(sheets) if suffix == ".dxf" else encode_pdf(sheets, made.settings.paper)})
+    return write_files(
+        {path: encode_plan_dxf(sheets) if suffix == ".dxf" else encode_plan_pdf(sheets, made.settings.paper)}
+    )
 
 
-def encode_dxf(sheets: list[Sheet]) -> bytes:
+def encode_plan_dxf(sheets: list[Sheet]) -> bytes:
     """Return the drawings as DXF in millimetres: the plan in the building frame, the others below it, a layer for each kind of line."""
     ezdxf = _ezdxf()
     from ezdxf.enums import TextEntityAlignment
@@ -133,7 +135,7 @@ def scale_on(sheet: Sheet, paper: str) -> tuple[float, tuple[float, float]]:
     return next((scale for scale in USUAL_SCALES if scale >= need), need), (float(wide), float(tall))
 
 
-def encode_pdf(sheets: list[Sheet], paper: str) -> bytes:
+def encode_plan_pdf(sheets: list[Sheet], paper: str) -> bytes:
     """Return the drawings as PDF, a page each, to scale."""
     from matplotlib.backends.backend_pdf import PdfPages
 

@@ -25,7 +25,7 @@ from ..structure.results import Solution
 from .project_trade import TRADE_BEFORE, TRADE_HEAD, TRADE_NODES, head_of_trade, nodes_of_trade, trade_of_parts
 from .scan_parts import UP_AXES, Cleaning, WholeScan, part_of_scan, taken_of_scan
 from .state import Design, StudioState, Trade
-from .support_places import placed
+from .support_places import placed_supports
 
 PROJECT_FORMAT, PROJECT_VERSION = "scantruss-project", 5
 CLEANING_OF_PART = 3  #: last version in which a cleaning named the points of the part that was taken
@@ -207,7 +207,7 @@ def _project_of(parts: dict[str, bytes]) -> tuple[StudioState, bool]:
         trade=trade_of_parts(parts, grid, _grid_of),
         is_live=bool(head.get("quick", False)) and grid is not None,
         structure_settings=structure_settings,
-        support_places=placed(structure_settings.supports, known, grid),
+        support_places=placed_supports(structure_settings.supports, known, grid),
         solved_with=_structure_settings_of(parts["solved.toml"]) if "solved.toml" in parts else None,
         designs=tuple(
             _design_of(each, _grid_of(parts[f"design-{k}.json"]), part)

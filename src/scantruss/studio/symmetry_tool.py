@@ -139,7 +139,7 @@ class SymmetryTool:
         faces = np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
         for k, plane in enumerate(planes):
             self.view.scene.api.add_mesh_simple(
-                f"/mirror/{k}", corners_of(frame, np.array(plane, float)), faces, color=PLANE_COLOR, side="double", opacity=0.25,
+                f"/mirror/{k}", corners_of_plane(frame, np.array(plane, float)), faces, color=PLANE_COLOR, side="double", opacity=0.25,
                 flat_shading=True, cast_shadow=False, receive_shadow=False,
             )  # fmt: skip
 
@@ -171,7 +171,7 @@ def ends_on(places: np.ndarray, plane: np.ndarray, length: float) -> np.ndarray 
     return ends - ((ends - plane[:3]) @ normal)[:, None] * normal
 
 
-def corners_of(frame: SceneFrame, plane: np.ndarray) -> np.ndarray:
+def corners_of_plane(frame: SceneFrame, plane: np.ndarray) -> np.ndarray:
     """Return the corners (4, 3) of a plane as it is drawn around the middle of the scan, float32."""
     normal = plane[3:] / np.linalg.norm(plane[3:])
     at = frame.to_scene(plane[None, :3])[0].astype(float)

@@ -96,7 +96,7 @@ class Mark:
     also: tuple[Place, ...] = ()  #: more such places
 
 
-def marks_of(grid: Grid) -> list[Mark]:
+def places_marked(grid: Grid) -> list[Mark]:
     """Return the places of faults and warnings; where there are none, the worst members and the worst angle."""
     found = grid.certificate
     if found is None:

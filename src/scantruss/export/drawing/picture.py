@@ -22,7 +22,7 @@ from ...runtime.places import check_place
 from ...scan.cloud import PointCloud
 from .camera import Camera, choose_camera
 from .left_out import Shown, shown_points
-from .legend import FAULT_COLOUR, Legend, Ring, Row, Text, marks_of, scale_bar
+from .legend import FAULT_COLOUR, Legend, Ring, Row, Text, places_marked, scale_bar
 from .strokes import (
     INK_COLOUR,
     MOST_POINTS,
@@ -111,7 +111,7 @@ def plot_grid(grid: Grid, cloud: PointCloud | None, views: tuple[str, ...], size
 
 def _rings(grid: Grid, camera: Camera, em: float, texts: list[Text]) -> list[Ring]:
     """Return rings at the places to look at, and add their numbers to the texts."""
-    marks = marks_of(grid)
+    marks = places_marked(grid)
     if not marks:
         return []
     flat, _ = camera.project(np.array([mark.where for mark in marks]) - grid.origin)
@@ -131,7 +131,7 @@ def _legend_rows(grid: Grid, shown: Shown | None) -> list[Row]:
     rows = [Row("This grid fails its certificate:", "", FAULT_COLOUR)] * failed
     rows += [Row(part.words, "\u25cf", part.colour) for part in (shown.missed if shown else ())]
     rows += [Row(words) for words in (shown.unread if shown else ())]
-    return rows + [Row(mark.words, str(number), mark.colour) for number, mark in enumerate(marks_of(grid), 1)]
+    return rows + [Row(mark.words, str(number), mark.colour) for number, mark in enumerate(places_marked(grid), 1)]
 
 
 def encode_cloud(cloud: PointCloud) -> bytes:

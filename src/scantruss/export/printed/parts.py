@@ -97,7 +97,7 @@ def _outside_up(axes: np.ndarray, normal: np.ndarray) -> np.ndarray:
     return axes if axes[2] @ normal >= 0 else axes * np.array([[1.0], [-1.0], [-1.0]])
 
 
-def divide(
+def divide_for_bed(
     nodes: np.ndarray, edges: np.ndarray, bed: Bed, pad: float, pad_cut: float, unit: str = ""
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the part of each node (V,), and for each member (E, 3) the direction in which its two parts come apart; 0 within one.
@@ -168,7 +168,7 @@ def build_parts(
     used, edges = np.unique(grid.edges, return_inverse=True)
     edges = edges.reshape(-1, 2)
     nodes = np.asarray(grid.nodes[used], np.float64) * scale
-    part_of, pulled = divide(nodes, edges, bed, node / 2, joint.reach, grid.unit)
+    part_of, pulled = divide_for_bed(nodes, edges, bed, node / 2, joint.reach, grid.unit)
     if (along := (np.diff(nodes[edges], axis=1)[:, 0] * pulled).sum(axis=1)).any():
         edges = np.where((along < 0)[:, None], edges[:, ::-1], edges)  # from the side with pegs to that with sockets
     balls = balls_of(grid, used, nodes, node / 2, sides, marks)

@@ -134,7 +134,7 @@ def sides_of_edge(mesh: CollapsingMesh, a: int, b: int) -> int:
 
 
 @kernel
-def may_collapse(mesh: CollapsingMesh, a: int, b: int) -> bool:
+def may_collapse_edge(mesh: CollapsingMesh, a: int, b: int) -> bool:
     """Whether node b may become node a: the mesh stays a manifold, and a node of a chain goes along it."""
     if mesh.held[b] == RESTING_NODE:
         return False
@@ -160,7 +160,7 @@ def may_collapse(mesh: CollapsingMesh, a: int, b: int) -> bool:
 
 
 @kernel
-def collapse(mesh: CollapsingMesh, a: int, b: int) -> None:
+def collapse_edge(mesh: CollapsingMesh, a: int, b: int) -> None:
     """Let node b become node a, with all of its triangles and links but those at the edge."""
     triangles, ends, count, links = mesh.triangles, mesh.ends, mesh.corners.places, mesh.links.places
     c = mesh.corners.head[b]
@@ -216,8 +216,8 @@ def collapse_edges(
                 continue
             if held[b] > held[a] or (held[b] == held[a] and b < a):
                 a, b = b, a  # b goes
-            if may_collapse(mesh, a, b):
-                collapse(mesh, a, b)
+            if may_collapse_edge(mesh, a, b):
+                collapse_edge(mesh, a, b)
                 into[b] = a
             else:
                 waiting[left, 0], waiting[left, 1] = waiting[i, 0], waiting[i, 1]

@@ -86,7 +86,7 @@ def normal_equations(buffer: np.ndarray, taken: int, matrix: np.ndarray) -> None
 
 
 @kernel
-def solve(matrix: np.ndarray, size: int) -> bool:
+def solve_normal_equations(matrix: np.ndarray, size: int) -> bool:
     """Solve the symmetric system in matrix[:size, :size + 1] in place; the solution is left in its last column."""
     for i in range(size):
         pivot = matrix[i, i]
@@ -118,7 +118,7 @@ def fit_heights(
         for r in range(size):
             matrix[r, size] = matrix[r, TERMS_OF_QUADRIC]
             matrix[r, r] += REGULARIZATION * matrix[0, 0]
-        if solve(matrix, size) or size == 1:
+        if solve_normal_equations(matrix, size) or size == 1:
             break
         size = TERMS_OF_PLANE if size == TERMS_OF_QUADRIC else 1
     for c in range(TERMS_OF_QUADRIC):

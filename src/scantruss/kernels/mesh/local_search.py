@@ -260,7 +260,7 @@ def move_at(net: Net, v: int, u: int, way: int, length: float) -> tuple[int, int
 
 
 @kernel
-def search(
+def search_moves(
     net: Net,
     patches: np.ndarray,
     curves: Curves,

@@ -11,7 +11,7 @@ from ...runtime.jit import kernel
 from ..boundary.curves import Curves
 from ..geometry.vectors import fill_row
 from .equalize import OVER_RELAXATION, settle_node
-from .grid import LOCKED, Net, place_of, wings
+from .grid import LOCKED, Net, place_in_ring, wings
 from .local_search import (
     COLLAPSE,
     FLIP,
@@ -269,7 +269,7 @@ def is_as_before(net: Net, area: Area) -> bool:
         if net.degree[v] != area.degree[k]:
             return False
         for i in range(net.degree[v]):
-            if place_of(net, v, area.ring[k, i]) < 0:
+            if place_in_ring(net, v, area.ring[k, i]) < 0:
                 return False
     return True
 

@@ -8,7 +8,7 @@ from ...runtime.jit import kernel
 from ..geometry.kd_tree import STACK_LEVELS, KDTree
 from ..geometry.quadric import FIT_POINT
 from ..geometry.vectors import along, dot, row, subtract, unit
-from ..surface.patches import Patches, fit, foot, gather
+from ..surface.patches import Patches, fit, foot, gather_around
 
 MOST_AROUND = 600  # most points around a place
 RADIUS_RATIO = 1.3  # from one radius to the next narrower one
@@ -45,11 +45,11 @@ def fit_patches(
     buffer, matrix = np.zeros(MOST_AROUND, FIT_POINT), np.zeros((6, 7))
     for i in range(begin, end):
         place = row(tree.points, centres[i])
-        taken = gather(tree, place, widest * radii[i], -1, stack, found, buffer)
+        taken = gather_around(tree, place, widest * radii[i], -1, stack, found, buffer)
         share = widest
         while taken == MOST_AROUND and share > 1.0:  # the share falls to one
             share = max(share / RADIUS_RATIO, 1.0)
-            taken = gather(tree, place, share * radii[i], -1, stack, found, buffer)
+            taken = gather_around(tree, place, share * radii[i], -1, stack, found, buffer)
         while True:  # the share falls to one
             fit(buffer, taken, share * radii[i], NOISE_PATCH_FITS, patches, i, matrix)
             if patches.rms[i] <= usual[i] or share <= 1.0:

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from ...runtime.jit import kernel
-from ..geometry.kd_tree import STACK_LEVELS, KDTree, nearest
+from ..geometry.kd_tree import STACK_LEVELS, KDTree, nearest_in_tree
 from ..geometry.planes import plane_of
 from ..geometry.quadric import FIT_POINT
 from ..geometry.vectors import Vector, across, cross, dot, norm, put_vector, row, subtract
@@ -36,7 +36,9 @@ def nearest_alive(
     stack, found, away = np.empty(2 * STACK_LEVELS, np.int64), np.empty(3 * most, np.int64), np.empty(3 * most)
     for i in range(len(which)):
         p = which[i]
-        count = nearest(tree, tree.points[p, 0], tree.points[p, 1], tree.points[p, 2], 3 * most, stack, found, away)
+        count = nearest_in_tree(
+            tree, tree.points[p, 0], tree.points[p, 1], tree.points[p, 2], 3 * most, stack, found, away
+        )
         held = 0
         for k in range(count):
             if found[k] != p and alive[found[k]] and held < most:
@@ -89,7 +91,7 @@ def stand_off(
         place = row(tree.points, p)
         taken, radius, most = 0, 0.0, around + around // 4
         while taken < around and most <= room:  # farther where many around are left out
-            count = nearest(tree, place[0], place[1], place[2], most, stack, found, away)
+            count = nearest_in_tree(tree, place[0], place[1], place[2], most, stack, found, away)
             taken = 0
             for k in range(count):
                 if found[k] != p and alive[found[k]] and taken < around:
@@ -143,7 +145,7 @@ def find_sheets(
         most, taken, count, exhausted = POINTS_OF_SHEET, 0, 0, False
         while taken < POINTS_OF_SHEET and not exhausted:  # each turn looks at twice as many, MOST_LOOKED_AT at most
             most *= 2
-            count = nearest(tree, place[0], place[1], place[2], most, stack, found, away)
+            count = nearest_in_tree(tree, place[0], place[1], place[2], most, stack, found, away)
             taken = 0
             for k in range(count):
                 q = found[k]
@@ -235,7 +237,7 @@ def measure_bulk(tree: KDTree, alive: np.ndarray, which: np.ndarray, bulk: np.nd
     for i in range(begin, end):
         place = row(tree.points, which[i])
         count = 0
-        for k in range(nearest(tree, place[0], place[1], place[2], 2 * POINTS_OF_CLOUD, stack, found, away)):
+        for k in range(nearest_in_tree(tree, place[0], place[1], place[2], 2 * POINTS_OF_CLOUD, stack, found, away)):
             if alive[found[k]] and count < POINTS_OF_CLOUD:
                 offsets[count, 0], offsets[count, 1], offsets[count, 2] = subtract(row(tree.points, found[k]), place)
                 count += 1

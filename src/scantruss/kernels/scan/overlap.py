@@ -79,7 +79,7 @@ def moved(pose: np.ndarray, p: Vector) -> Vector:
 
 
 @kernel
-def turned(pose: np.ndarray, v: Vector) -> Vector:
+def turned_by_motion(pose: np.ndarray, v: Vector) -> Vector:
     """Return the direction that a (4, 4) pose gives to v."""
     return (
         pose[0, 0] * v[0] + pose[0, 1] * v[1] + pose[0, 2] * v[2],
@@ -151,7 +151,7 @@ def step_sums(
         n = nearest(boxes, places, q[0], q[1], q[2], reach)
         if n < 0 or place_at_boundary[n]:
             continue
-        v = turned(back, row(normals, p))
+        v = turned_by_motion(back, row(normals, p))
         m = row(place_normals, n)
         v = (turn * v[0], turn * v[1], turn * v[2])
         if dot(v, m) < SLOPE_OF_PAIR:
@@ -160,7 +160,7 @@ def step_sums(
         across = dot(d, m) / soft
         weight = 1.0 / (1.0 + across * across)
         # the difference and the normals in the common frame: pose @ inverse(back) turns them
-        w = turned(pose, row(normals, p))
+        w = turned_by_motion(pose, row(normals, p))
         w = (turn * w[0], turn * w[1], turn * w[2])
         common = moved(pose, row(points, p))
         d = _into(pose, back, d)
@@ -173,7 +173,7 @@ def step_sums(
 @kernel
 def _into(pose: np.ndarray, back: np.ndarray, v: Vector) -> Vector:
     """Turn a direction from the frame of the places into the common one: by the inverse of `back`, then by `pose`."""
-    return turned(
+    return turned_by_motion(
         pose,
         (
             back[0, 0] * v[0] + back[1, 0] * v[1] + back[2, 0] * v[2],
@@ -184,7 +184,7 @@ def _into(pose: np.ndarray, back: np.ndarray, v: Vector) -> Vector:
 
 
 @kernel
-def judge(
+def judge_overlap(
     points: np.ndarray,
     normals: np.ndarray,
     places: np.ndarray,
@@ -214,7 +214,7 @@ def judge(
         off = dot(d, m)
         if dot(d, d) - off * off > OVER_PLACE * OVER_PLACE * spacing * spacing:
             continue  # beside the surface of the other scan, not over it
-        cosine = turn * dot(turned(back, row(normals, p)), m)
+        cosine = turn * dot(turned_by_motion(back, row(normals, p)), m)
         if cosine < OTHER_SIDE:
             continue
         if abs(off) <= near and cosine > SAME_SLOPE:

@@ -86,7 +86,7 @@ def trust_thin_samples(
 
 
 @kernel
-def face_off_edges(
+def face_off_edges_of(
     mean: np.ndarray, normals: np.ndarray, boxes: SearchBoxes, thick: np.ndarray, reach: float, begin: int, end: int
 ) -> None:
     """Let samples on a sharp edge of a body face away from it: some of `thick` (P,), from `begin` to `end` - 1.
@@ -147,7 +147,7 @@ def across_to(d: Vector, way: Vector) -> Vector:
 
 
 @kernel
-def cut_steep_links(
+def cut_steep_links_of(
     mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, steep: float, begin: int, end: int
 ) -> None:
     """Drop neighbours that lie above or below a sample from `begin` to `end` - 1, not beside it: they are on another sheet."""

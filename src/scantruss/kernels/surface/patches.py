@@ -20,7 +20,7 @@ from ..geometry.quadric import (
     project,
     second_moments,
     slopes_at,
-    solve,
+    solve_normal_equations,
 )
 from ..geometry.vectors import Vector, across, along, cross, dot, put_vector, row, smallest_eigenvector, subtract, unit
 
@@ -49,7 +49,7 @@ def empty_patches(count: int) -> Patches:
 
 
 @kernel
-def gather(
+def gather_around(
     tree: KDTree, place: Vector, radius: float, leave: int, stack: np.ndarray, found: np.ndarray, buffer: np.ndarray
 ) -> int:
     """Put the points within a radius of a place into the buffer of a fit, except the one `leave`; returns how many.
@@ -146,7 +146,7 @@ def height_variance(buffer: np.ndarray, taken: int, size: int, matrix: np.ndarra
     for r in range(size):
         matrix[r, size] = 1.0 if r == 0 else 0.0
         matrix[r, r] += REGULARIZATION * matrix[0, 0]
-    if not solve(matrix, size):
+    if not solve_normal_equations(matrix, size):
         return math.inf
     variance = 0.0
     for i in range(taken):

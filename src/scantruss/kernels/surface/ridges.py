@@ -15,7 +15,7 @@ import math
 import numpy as np
 
 from ...runtime.jit import kernel, record_type
-from ..geometry.quadric import REGULARIZATION, solve
+from ..geometry.quadric import REGULARIZATION, solve_normal_equations
 from ..geometry.vectors import Vector, along, cross, dot, norm, put_vector, row, subtract, unit, vector_of
 from .local_surface import Surface, flood, gather_points, walk
 from .turned_folds import QuadricFreePoints, smooth_part, turned_fold_error
@@ -132,7 +132,7 @@ def fold_error(
             matrix[r, k] = matrix[k, r]
         matrix[r, r] += REGULARIZATION * matrix[0, 0]
         right[r] = matrix[r, TERMS]
-    if not solve(matrix, TERMS):
+    if not solve_normal_equations(matrix, TERMS):
         return np.inf
     for r in range(TERMS):
         squares -= right[r] * matrix[r, TERMS]
@@ -182,7 +182,11 @@ def flank(
         across[r, r] += REGULARIZATION * across[0, 0]
         for k in range(TERMS_OF_SIDE):
             up[r, k] = across[r, k]
-    if points < FEWEST_OF_FLANK or not solve(across, TERMS_OF_SIDE) or not solve(up, TERMS_OF_SIDE):
+    if (
+        points < FEWEST_OF_FLANK
+        or not solve_normal_equations(across, TERMS_OF_SIDE)
+        or not solve_normal_equations(up, TERMS_OF_SIDE)
+    ):
         return 0.0, 0.0, 0.0, 0.0, False
     half = 1.0 - MIDDLE_OF_SIDES
     slope_across, bend_across = across[SLOPE_OF_SIDE, TERMS_OF_SIDE], across[BEND_OF_SIDE, TERMS_OF_SIDE]

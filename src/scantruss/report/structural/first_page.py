@@ -12,7 +12,7 @@ from ...structure.report import StructureReport
 from ...structure.truss import Truss
 from .parts import DataTable, Headline, PointList, ReportPart, SectionHead, Sentence
 from .source import ReportSource, cases_of_state, greatest_stress
-from .words import load_words, support_words
+from .words import load_words, supports_in_words
 
 CLAUSES_USED = (
     ("EN 1993-1-1 table 5.2", "class of the section"),
@@ -119,7 +119,7 @@ def _assumptions(truss: Truss, settings: StructureSettings, stability: bool) -> 
     sources = sorted({section.source for section in truss.sections if section.source})
     yield f"Sections: {', '.join(section.name for section in truss.sections)} ({'; '.join(sources) or 'own'})."
     held = int(truss.supports.any(axis=1).sum())
-    yield f"{held:,} supports, {settings.support_type}: {support_words(settings.supports)}."
+    yield f"{held:,} supports, {settings.support_type}: {supports_in_words(settings.supports)}."
     loads = [load_words(load) for load in settings.loads]
     nodes = (
         f"{100 * settings.node_allowance:g} % of the weight of the members is added for the nodes"

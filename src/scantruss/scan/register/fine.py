@@ -127,12 +127,12 @@ def solve_step(stiffness: np.ndarray, load: np.ndarray, arm: float) -> np.ndarra
     return scale * step
 
 
-def judge(first: View, second: View, pose: np.ndarray, turn: float, near: float, reach: float) -> Fit:
+def judge_pair(first: View, second: View, pose: np.ndarray, turn: float, near: float, reach: float) -> Fit:
     """Return how two scans agree under a pose (4, 4) of the first in the frame of the second; near and reach [scan unit]."""
     shares, over = [], []
     all_agreeing, all_against, all_squares = 0, 0, 0.0
     for a, b, back in ((first, second, pose), (second, first, invert(pose))):
-        agreeing, against, squares = kernels.judge(
+        agreeing, against, squares = kernels.judge_overlap(
             a.points, a.normals, b.points, b.normals, b.on_boundary, b.boxes,
             np.ascontiguousarray(back), turn, b.spacing, near, reach,
         )  # fmt: skip

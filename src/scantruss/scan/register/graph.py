@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...kernels.scan.overlap import MOTION_NUMBERS
-from .fine import Fit, add_pairs, judge, solve_step
+from .fine import Fit, add_pairs, judge_pair, solve_step
 from .pairs import DISAGREEING_DISTANCE, Pair, judge_views, nearness
 from .poses import invert, move, small_motion
 from .scans import Scan
@@ -38,7 +38,7 @@ class Group:
     turns: dict[int, float]  #: 1, or -1 for those whose normals face the other side
 
 
-def assemble(
+def assemble_poses(
     scans: list[Scan], pairs: list[Pair], progress: Callable[[str, float], None]
 ) -> tuple[list[Group], set[int]]:
     """Return the groups formed by the pairs, the largest first, and the scans that fit in more ways than one.
@@ -173,7 +173,7 @@ def fine_fit_of(scans: list[Scan], group: Group, first: int, second: int) -> Fit
     one, other = scans[first], scans[second]
     pose = invert(group.poses[second]) @ group.poses[first]
     near, reach = nearness(one.middle, other.middle), DISAGREEING_DISTANCE * one.middle.spacing
-    return judge(one.fine, other.fine, pose, group.turns[first] * group.turns[second], near, reach)
+    return judge_pair(one.fine, other.fine, pose, group.turns[first] * group.turns[second], near, reach)
 
 
 def links_of(scans: list[Scan], group: Group, *, against: bool = False) -> dict[tuple[int, int], Fit]:

@@ -19,7 +19,7 @@ from .graph import (
     CONTRADICTING_AGREEMENT,
     Group,
     agree_on_pose,
-    assemble,
+    assemble_poses,
     fine_fit_of,
     fit_of,
     links_of,
@@ -161,7 +161,7 @@ def _put_together(
         progress("features", 0.0)
         pairs += find_pairs(scans, find_features([scan.coarse for scan in scans]), wanted, progress)
     scans = with_strictness(scans, pairs)
-    groups, doubtful = assemble(scans, rejudge(pairs, scans), progress)
+    groups, doubtful = assemble_poses(scans, rejudge(pairs, scans), progress)
     group = groups[0]
     group, elsewhere = leave_out_doubtful(scans, group, _sure(scans, group, started), progress)
     doubtful |= elsewhere
