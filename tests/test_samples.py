@@ -89,7 +89,7 @@ def clouds(draw: st.DrawFn) -> np.ndarray:
 
 @pytest.mark.kernels
 @given(clouds(), st.floats(0.02, 0.8))
-def test_every_point_has_a_site_within_the_radius_and_sites_keep_it(points: np.ndarray, radius: float) -> None:
+def test_every_point_has_a_sample_within_the_radius_and_samples_keep_it(points: np.ndarray, radius: float) -> None:
     owner, chosen = thinned(points, radius)
     assert chosen.tolist() == naive.thin(points, radius)
     assert (np.linalg.norm(points - points[chosen[owner]], axis=1) < radius).all()
