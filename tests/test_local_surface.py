@@ -205,7 +205,7 @@ def slit_sheet() -> Surface:
 
 @pytest.mark.kernels
 @pytest.mark.parametrize("reach", [1.2, 1.6, 2.5, 4.0])
-def test_sites_on_both_sides_of_a_slit_are_linked_if_the_way_around_its_end_is_within_reach(reach: float) -> None:
+def test_samples_on_both_sides_of_a_slit_are_linked_if_the_way_around_its_end_is_within_reach(reach: float) -> None:
     surface = slit_sheet()
     rng = np.random.default_rng(int(10 * reach))
     x, y = surface.mean[:, 0], surface.mean[:, 1]

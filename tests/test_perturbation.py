@@ -59,7 +59,7 @@ def perturb(mesh: WorkingMesh, scratch: Scratch, area: Area, v: int, worth: floa
 
 
 @pytest.mark.kernels
-def test_a_kick_that_does_not_pay_leaves_no_trace(settled: tuple[Rough, WorkingMesh, Scratch, Area]) -> None:
+def test_a_perturbation_that_does_not_pay_leaves_no_trace(settled: tuple[Rough, WorkingMesh, Scratch, Area]) -> None:
     """If a node more or less may cost nothing, at most what moves no node pays."""
     _, mesh, scratch, area = settled
     net = mesh.net
@@ -98,7 +98,7 @@ def test_the_energy_of_the_area_changes_by_as_much_as_that_of_the_grid(
         assert after[0] - before[0] == pytest.approx(after[1] - before[1], abs=1e-9)
 
 
-def test_a_kick_that_pays_lowers_the_energy_by_more_than_its_nodes_are_worth(
+def test_a_perturbation_that_pays_lowers_the_energy_by_more_than_its_nodes_are_worth(
     settled: tuple[Rough, WorkingMesh, Scratch, Area],
 ) -> None:
     rough, mesh, scratch, area = settled
@@ -114,7 +114,7 @@ def test_a_kick_that_pays_lowers_the_energy_by_more_than_its_nodes_are_worth(
     assert same_topology(rough.grid, mesh.to_grid(rough.grid))
 
 
-def test_heat_lets_a_kick_cost_something(settled: tuple[Rough, WorkingMesh, Scratch, Area]) -> None:
+def test_heat_lets_a_perturbation_cost_something(settled: tuple[Rough, WorkingMesh, Scratch, Area]) -> None:
     _, mesh, scratch, area = settled
     rises = 0
     for v in np.flatnonzero(mesh.net.degree > 0).tolist():
