@@ -165,7 +165,7 @@ def test_directions_of_neighbours_agree_but_at_a_few_singular_places(
     assert np.linalg.norm(posts.direction, axis=1) == pytest.approx(1.0)
 
 
-def test_every_sample_has_a_post_within_reach_and_nodes_keep_their_distance() -> None:
+def test_every_sample_has_a_node_within_reach_and_nodes_keep_their_distance() -> None:
     shape = make("cloth", 20_000)
     _, scan = scanned(shape.points, shape.length)
     surface = scan.samples.surface
