@@ -6,10 +6,12 @@ DIR, or the environment's SCANTRUSS_DATA, holds `twins` with `twins_truth.json` 
 from __future__ import annotations
 
 import argparse
+import csv
 import json
 import os
+import statistics
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
@@ -17,7 +19,7 @@ from typing import Any
 
 import scantruss as st
 
-from .page import Section
+from .page import FILE, Section
 
 REAL = {  # member lengths that suit the real scans, in their units
     "scallop.ply": 1.9, "scallop_dense.laz": 1.9, "bunny_zipper.ply": 0.006, "bunnyDouble.e57": 0.006, "humface.csv": 7.0,
@@ -25,16 +27,28 @@ REAL = {  # member lengths that suit the real scans, in their units
     "quarry_samp53-utm-ground.pcd": 12.0, "srtm_bigtujunga_utm11.laz": 400.0,
 }  # fmt: skip
 WAYS = ("paper", "quick", "normal", "best")
-HEADER = (
-    "| scan | by | mean G | std G | min G | CV | length | angles | six | topology | certificate | seconds |\n"
-    "| --- | --- |" + " ---: |" * 7 + " --- | --- | ---: |"
+COLUMNS = (
+    "scan",
+    "by",
+    "mean G",
+    "std G",
+    "min G",
+    "CV",
+    "length",
+    "angles",
+    "six",
+    "topology",
+    "certificate",
+    "seconds",
 )
+MEDIANS = ("mean G", "std G", "min G", "CV", "six", "seconds")  # shown on the page, of each way
 NOTE = """\
 Before: what the front of the default method leaves. Paper: to the letter, after its optimization. Quick, normal, best: the
 efforts of the default method. G, CV, mean length in desired lengths, smallest and largest angle, share of inner nodes with six
 members. Topology: right or wrong where the truth is known, else what came out as loops / Euler number; refused, and why.
 Certificate: irregular members present - those forced, share of the scan within half a member of a triangle. Seconds: the whole
-run in one process on points in memory, on a machine shared with other work."""
+run in one process on points in memory, on a machine shared with other work. [Every row](scans.csv)."""
+Row = tuple[str, ...]  # a cell of each column
 
 
 @dataclass(frozen=True)
@@ -51,7 +65,7 @@ class Scan:
             return f"{topology.boundary_loops} / {topology.euler}"
         wanted = tuple(self.truth[name] for name in ("boundary_loops", "euler_characteristic", "components"))
         right = wanted == (topology.boundary_loops, topology.euler, topology.components)
-        return "right" if right and topology.manifold and topology.orientable else "**wrong**"
+        return "right" if right and topology.manifold and topology.orientable else "wrong"
 
 
 def data_folder(given: str | None = None) -> Path | None:
@@ -71,11 +85,11 @@ def scans_in(data: Path, names: Iterable[str] = ()) -> list[Scan]:
     ]
 
 
-def rows_of(scan: Scan, ways: Iterable[str] = WAYS) -> list[str]:
+def rows_of(scan: Scan, ways: Iterable[str] = WAYS) -> list[Row]:
     """Return a row for what the front leaves, and one for each way."""
     cloud = st.read_points(scan.path)
-    before: list[str] = []
-    rows = []
+    before: list[Row] = []
+    rows: list[Row] = []
     for way in ways:
         own: dict[str, Any] = {"method": "paper"} if way == "paper" else {"effort": way}
         started = perf_counter()
@@ -83,40 +97,63 @@ def rows_of(scan: Scan, ways: Iterable[str] = WAYS) -> list[str]:
             grid = st.grid_from_points(cloud.points + cloud.origin, st.Settings(length=scan.length, **own))
         except st.ScanTrussError as error:
             words = f"{'right: ' if scan.truth.get('orientable') is False else ''}refused: {error}"
-            rows.append(f"| {scan.path.name} | {way} |" + " |" * 7 + f" {words} | | {perf_counter() - started:.2f} |")
+            rows.append((scan.path.name, way, *7 * ("",), words, "", f"{perf_counter() - started:.2f}"))
             continue
         seconds, certificate = perf_counter() - started, grid.certificate
         assert certificate is not None and grid.before is not None
         if way != "paper" and not before:
-            before = [f"| {scan.path.name} | before | {_figures(grid.before, scan.length)} | | | |"]
+            before = [(scan.path.name, "before", *_figures(grid.before, scan.length), "", "", "")]
         extra = certificate.irregular - certificate.irregular_forced
-        passed = f"passed, {certificate.irregular} - {certificate.irregular_forced} = {extra}"
-        rows.append(
-            f"| {scan.path.name} | {way} | {_figures(grid.quality, scan.length)} | {scan.judge(grid.topology)} |"
-            f" {passed}, {certificate.scan_within_reach:.1%} | {seconds:.2f} |"
-        )
+        irregular = f"{certificate.irregular} - {certificate.irregular_forced} = {extra}"
+        passed = f"passed, {irregular}, {certificate.scan_within_reach:.1%}"
+        figures = _figures(grid.quality, scan.length)
+        rows.append((scan.path.name, way, *figures, scan.judge(grid.topology), passed, f"{seconds:.2f}"))
     return before + rows
 
 
-def _figures(quality: st.GridQuality, length: float) -> str:
+def _figures(quality: st.GridQuality, length: float) -> Row:
     return (
-        f"{quality.shape_mean:.4f} | {quality.shape_std:.4f} | {quality.shape_min:.2f} | {quality.length_cv:.4f} |"
-        f" {quality.length_mean / length:.3f} | {quality.angle_min:.0f}-{quality.angle_max:.0f} | {quality.valence6:.2f}"
-    )
+        f"{quality.shape_mean:.4f}", f"{quality.shape_std:.4f}", f"{quality.shape_min:.2f}", f"{quality.length_cv:.4f}",
+        f"{quality.length_mean / length:.3f}", f"{quality.angle_min:.0f}-{quality.angle_max:.0f}", f"{quality.valence6:.2f}",
+    )  # fmt: skip
 
 
-def page_section(command: str, data: Path | None) -> Section | None:
-    """Return the section of docs/numbers.md, what is wrong or refused first; None where the scans are not there."""
+def cell(row: Row, column: str) -> str:
+    """Return the cell of a row in a column."""
+    return row[COLUMNS.index(column)]
+
+
+def summary(rows: Sequence[Row]) -> str:
+    """Return the table of the ways: how many scans have a grid, and the medians of these."""
+    lines = ["| by | grids | " + " | ".join(MEDIANS) + " |", "| --- | ---: |" + " ---: |" * len(MEDIANS)]
+    for way in dict.fromkeys(cell(row, "by") for row in rows):
+        own = [row for row in rows if cell(row, "by") == way and cell(row, "mean G")]
+        tried = sum(cell(row, "by") == way for row in rows)
+        medians = []
+        for column in MEDIANS:
+            values = [cell(row, column) for row in own if cell(row, column)]
+            digits = max((len(value.partition(".")[2]) for value in values), default=0)
+            medians.append(f"{statistics.median(map(float, values)):.{digits}f}" if values else "")
+        lines.append(f"| {way} | {len(own)} of {tried} | " + " | ".join(medians) + " |")
+    return "\n".join(lines)
+
+
+def page_section(command: str, data: Path | None, folder: Path = FILE.parent) -> Section | None:
+    """Return the section of docs/numbers.md, with every row in scans.csv beside it; None where the scans are not there."""
     if data is None:
         return None
-    ways = tuple(WAYS)
-    rows = [row for scan in scans_in(data) for row in rows_of(scan, ways)]
-    bad = [row for row in rows if "**wrong**" in row or "| refused" in row]
-    wrong = sum("**wrong**" in row for row in rows)
+    rows = [row for scan in scans_in(data) for row in rows_of(scan)]
+    with (folder / "scans.csv").open("w", encoding="utf-8", newline="") as file:
+        csv.writer(file, lineterminator="\n").writerows([COLUMNS, *rows])
+    bad = [row for row in rows if cell(row, "topology") == "wrong" or "refused" in cell(row, "topology")]
+    wrong = sum(cell(row, "topology") == "wrong" for row in rows)
     finding = f"**{wrong}** of {len(rows)} rows are wrong, {len(bad) - wrong} refused."
-    lost = tuple(" ".join(row.strip("| ").split("|")) for row in bad if "right: refused" not in row)
-    text = "\n\n".join([NOTE, "\n".join([HEADER, *bad, *(row for row in rows if row not in bad)])])
-    return Section("Simulated and real scans", command, finding, text, lost)
+    lost = tuple(
+        f"{cell(row, 'scan')}, {cell(row, 'by')}: {cell(row, 'topology')}"
+        for row in bad
+        if "right: refused" not in cell(row, "topology")
+    )
+    return Section("Simulated and real scans", command, finding, f"{NOTE}\n\n{summary(rows)}", lost)
 
 
 def main() -> int:
@@ -129,12 +166,12 @@ def main() -> int:
     data = data_folder(options.data)
     if data is None:
         parser.error("no scans found; --data or SCANTRUSS_DATA names the folder that holds twins/twins_truth.json")
-    print(HEADER)
+    print(" | ".join(COLUMNS))
     wrong = False
     for scan in scans_in(data, options.names):
         for row in rows_of(scan, options.ways.split(",")):
-            print(row, flush=True)
-            wrong |= "**wrong**" in row
+            print(" | ".join(row), flush=True)
+            wrong |= cell(row, "topology") == "wrong"
     return int(wrong)
 
 

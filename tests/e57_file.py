@@ -11,7 +11,7 @@ from zlib import crc32
 
 import numpy as np
 
-from scantruss.scan.formats.e57_header import DATA, PAGE, checksums
+from scantruss.scan.formats.e57_header import DATA_BYTES, PAGE_BYTES, checksums
 
 SPACE = "http://www.astm.org/COMMIT/E57/2010-e57-v1.0"
 LARGEST_PACKET = 60_000  # bytes; the format allows 65,536
@@ -60,19 +60,19 @@ Scan = tuple[Sequence[Column], str]  # its columns and the XML of its pose, "" f
 
 def physical(place: int) -> int:
     """Return the byte of the file that holds a byte of the data."""
-    return place // DATA * PAGE + place % DATA
+    return place // DATA_BYTES * PAGE_BYTES + place % DATA_BYTES
 
 
 def to_pages(data: bytes) -> np.ndarray:
     """Return data, filled up with zeros, as pages with their checksums, (P, 1024) uint8."""
-    count = -(-len(data) // DATA)
-    pages = np.zeros((count, PAGE), dtype=np.uint8)
-    whole = len(data) // DATA
+    count = -(-len(data) // DATA_BYTES)
+    pages = np.zeros((count, PAGE_BYTES), dtype=np.uint8)
+    whole = len(data) // DATA_BYTES
     flat = np.frombuffer(data, dtype=np.uint8)
-    pages[:whole, :DATA] = flat[: whole * DATA].reshape(whole, DATA)
+    pages[:whole, :DATA_BYTES] = flat[: whole * DATA_BYTES].reshape(whole, DATA_BYTES)
     if whole < count:
-        pages[whole, : len(data) - whole * DATA] = flat[whole * DATA :]
-    pages[:, DATA:] = checksums(pages)[:, None].astype(">u4").view(np.uint8)
+        pages[whole, : len(data) - whole * DATA_BYTES] = flat[whole * DATA_BYTES :]
+    pages[:, DATA_BYTES:] = checksums(pages)[:, None].astype(">u4").view(np.uint8)
     return pages
 
 

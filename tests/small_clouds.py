@@ -9,7 +9,8 @@ from scantruss import PointCloud, Settings
 from scantruss.front.start import new_front
 from scantruss.kernels.front import front as lists
 from scantruss.kernels.front.fits import near_nodes
-from scantruss.kernels.surface.local_surface import PATCH_COLUMNS
+from scantruss.kernels.surface.local_surface import SURFACE_PATCH
+from scantruss.runtime.jit import new_record
 from scantruss.surface.samples import SurfaceSamples, sample_surface
 
 
@@ -105,7 +106,7 @@ class HandFront:
         self.surface = self.samples.surface
         self.front = new_front(self.samples, self.settings)
         self.rules = rules_of(self.settings, self.samples.spacing)
-        self.found, self.patch = np.empty(lists.MOST_NEAR_NODES, np.int64), np.zeros(PATCH_COLUMNS)
+        self.found, self.patch = np.empty(lists.MOST_NEAR_NODES, np.int64), new_record(SURFACE_PATCH)
         self.segments = []
         for i, loop in enumerate(loops):
             ids = [self.add_node(*place, boundary=True) for place in loop]
@@ -132,18 +133,18 @@ class HandFront:
     @property
     def triangles(self) -> list[frozenset[int]]:
         """Sets of the nodes of the triangles so far, in order."""
-        return [frozenset(t) for t in self.front.triangles[: self.front.count[lists.TRIANGLES]].tolist()]
+        return [frozenset(t) for t in self.front.triangles[: self.front.counts.triangles].tolist()]
 
     @property
     def alive(self) -> dict[tuple[int, int], int]:
         """(tail, head) of the segments of the front that are left, with their states."""
-        count = self.front.count[lists.SEGMENTS]
+        count = self.front.counts.segments
         rows = zip(self.front.tail[:count], self.front.head[:count], self.front.state[:count], strict=True)
         return {(int(t), int(h)): int(state) for t, h, state in rows if state != lists.GONE}
 
     @property
     def nodes(self) -> np.ndarray:
-        return self.front.nodes[: self.front.count[lists.NODES]]
+        return self.front.nodes[: self.front.counts.nodes]
 
 
 def rules_of(settings: Settings, spacing: float, strict: float = 1.0) -> lists.Rules:

@@ -7,6 +7,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from scantruss import Grid, GridQuality, PointCloud, Settings
+from scantruss.improve.flips import flip_edges
+from scantruss.improve.working_mesh import close_net, open_net
 
 
 def make_grid(nodes: ArrayLike, triangles: ArrayLike, fixed: Iterable[int] = (), **others: Any) -> Grid:
@@ -86,3 +88,12 @@ def cloud_over(grid: Grid, count: int = 3000) -> PointCloud:
     corners = grid.nodes[grid.triangles[rng.integers(len(grid.triangles), size=count)]]
     points = (corners * rng.dirichlet((1, 1, 1), count)[:, :, None]).sum(axis=1)
     return PointCloud(points=points - 7.0, origin=grid.origin + 7.0, unit=grid.unit)
+
+
+def flipped_edges(grid: Grid) -> tuple[Grid, int]:
+    """Return a grid after all flips that raise the smallest angle (Sec. 4.1), and how many they were."""
+    if not len(grid.triangles):
+        return grid, 0
+    net, source = open_net(grid)
+    count = flip_edges(net)
+    return close_net(net, source, grid), count

@@ -27,7 +27,7 @@ from scan_files import axes, e57, geotiff, npy, pcd, plate, text, whole_files
 from scantruss.cli.main import main
 from scantruss.errors import FormatError, InputError, ScanTrussError
 from scantruss.scan.cloud import PointCloud
-from scantruss.scan.formats.e57_header import DATA
+from scantruss.scan.formats.e57_header import DATA_BYTES
 from scantruss.scan.formats.reading import read_points
 from scantruss.scan.formats.table import READERS
 from scantruss.scan.stream.thin_scan import thin_scan
@@ -40,7 +40,7 @@ PDF = b"%PDF-1.7\n1 0 obj\n<</Type/Catalog>>\nendobj\n" * 20
 
 def pages(file: bytes) -> bytearray:
     """Return the data of an E57 file without its checksums."""
-    return bytearray(np.frombuffer(file, np.uint8).reshape(-1, 1024)[:, :DATA].tobytes())
+    return bytearray(np.frombuffer(file, np.uint8).reshape(-1, 1024)[:, :DATA_BYTES].tobytes())
 
 
 def in_e57(old: bytes, new: bytes, file: bytes = FILES["a.e57"]) -> bytes:
@@ -50,7 +50,12 @@ def in_e57(old: bytes, new: bytes, file: bytes = FILES["a.e57"]) -> bytes:
     (length,) = struct.unpack_from("<Q", data, 32)
     data = data[: start + length + (len(new) - len(old)) * pages(file).count(old)]
     struct.pack_into(
-        "<QQQ", data, 16, -(-len(data) // DATA) * 1024, start // DATA * 1024 + start % DATA, len(data) - start
+        "<QQQ",
+        data,
+        16,
+        -(-len(data) // DATA_BYTES) * 1024,
+        start // DATA_BYTES * 1024 + start % DATA_BYTES,
+        len(data) - start,
     )
     return to_pages(bytes(data)).tobytes()
 

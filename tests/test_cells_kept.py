@@ -10,7 +10,6 @@ from test_quads import bowl
 
 import scantruss as st
 from scantruss.cells.collapse import LatticeMesh
-from scantruss.cells.fine_mesh import ALONG, AT_REST_THERE, FREE
 from scantruss.cells.hexagons import dual_of
 from scantruss.cells.lead import Panels
 from scantruss.cells.quad_moves import Moves
@@ -19,6 +18,7 @@ from scantruss.constraints.network import curves_of
 from scantruss.grid.grid import Grid
 from scantruss.grid.panels import inner_angles_of, planarity_of, table_of, triangles_of
 from scantruss.improve.working_mesh import WorkingMesh
+from scantruss.kernels.cells.quads import FREE_NODE, RESTING_NODE, SLIDING_NODE
 from scantruss.scan.cloud import PointCloud
 from scantruss.surface.samples import sample_surface
 
@@ -118,11 +118,13 @@ def plate_with_a_panel_too_many() -> tuple[Any, int]:
     quads[2][0] = 16
     quads.append([2, 15, 16, 7])
     around = [0, 1, 2, 15, 16, 3, 4, 9, 14, 13, 12, 11, 10, 5]
+    held = np.full(17, FREE_NODE)
+    held[around], held[[0, 4, 10, 14]] = SLIDING_NODE, RESTING_NODE
     mesh = SimpleNamespace(
         nodes=np.array([(x, y, 0.0) for x, y in places]),
         quads=quads,
         at=[{q for q, ring in enumerate(quads) if v in ring} for v in range(17)],
-        held=np.where(np.isin(np.arange(17), [0, 4, 10, 14]), AT_REST_THERE, np.where(np.isin(np.arange(17), around), ALONG, FREE)),
+        held=held,
         chains={(min(a, b), max(a, b)) for a, b in zip(around, [*around[1:], 0], strict=True)},
         free=[],
         live=lambda: np.array(quads),
@@ -145,11 +147,11 @@ def test_a_panel_with_a_node_of_the_boundary_to_itself_goes_with_that_node() -> 
 
 def test_a_corner_between_two_nodes_of_the_boundary_stays() -> None:
     mesh, last = plate_with_a_panel_too_many()
-    mesh.held[15] = AT_REST_THERE
+    mesh.held[15] = RESTING_NODE
     assert Moves(mesh).collapse(last, 0) is None
-    mesh.held[15], mesh.held[[2, 16]] = ALONG, AT_REST_THERE
+    mesh.held[15], mesh.held[[2, 16]] = SLIDING_NODE, RESTING_NODE
     assert Moves(mesh).collapse(last, 0) is None
-    mesh.held[[2, 16]] = ALONG
+    mesh.held[[2, 16]] = SLIDING_NODE
     assert Moves(mesh).collapse(last, 0) is not None
     mesh.nodes[15, 1] = -0.3  # a tip of the boundary
     assert Moves(mesh).collapse(last, 0) is None

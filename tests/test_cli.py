@@ -24,7 +24,7 @@ from scantruss.cli.demo_files import DEMOS
 from scantruss.cli.main import main
 from scantruss.cli.options import option_of
 from scantruss.errors import CertificateError, FrontError, words_of_place
-from scantruss.export.drawing.legend import FAULT
+from scantruss.export.drawing.legend import FAULT_COLOUR
 from scantruss.export.formats import write
 from scantruss.grid.grid import Grid
 from scantruss.scan import member_length
@@ -439,7 +439,7 @@ def test_the_picture_of_a_grid_that_fails_is_written_and_shows_its_places_in_red
     written = {file.name for file in failing.iterdir()} - {"scan.xyz"}
     assert written == ({"a.png", "a.json", "a.settings.json", "r.json"} if keep else {"a.png"})
     picture = np.asarray(Image.open("a.png").convert("RGB")).astype(float)
-    assert (np.abs(picture - 255 * FAULT).max(axis=2) < 2).sum() > 60
+    assert (np.abs(picture - 255 * FAULT_COLOUR).max(axis=2) < 2).sum() > 60
 
 
 def test_where_no_grid_came_out_the_picture_shows_the_place_on_the_scan(
@@ -461,7 +461,7 @@ def test_where_no_grid_came_out_the_picture_shows_the_place_on_the_scan(
         top = high - round(
             high - (2 + 1.6 * lines) * 22.0 * min(wide / 1600, high / 1200)
         )  # of the scan, below the words
-        red = np.argwhere(np.abs(picture - 255 * FAULT).max(axis=2) < 60)
+        red = np.argwhere(np.abs(picture - 255 * FAULT_COLOUR).max(axis=2) < 60)
         low = red[red[:, 0] > 120]  # below the words
         at = (low.min(axis=0) + low.max(axis=0)) / 2
         seen = _seen(np.loadtxt("scan.xyz"), where, (high - top, wide, 3)) + [0, top]

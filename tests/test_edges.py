@@ -66,7 +66,7 @@ def initial_front(name: str) -> tuple[Front, SurfaceSamples, st.Settings]:
 
 def assert_closed_loops(front: Front) -> None:
     """Each segment is followed by one that begins where it ends, and no two by the same; each is listed at its tail."""
-    count = int(front.count[lists.SEGMENTS])
+    count = int(front.counts.segments)
     live = np.flatnonzero(front.state[:count] != lists.GONE)
     following = front.next[live]
     assert sorted(following.tolist()) == live.tolist()
@@ -95,8 +95,8 @@ def test_an_initial_front_that_is_not_closed_is_refused() -> None:
 def test_each_gap_that_is_closed_or_cut_out_leaves_fewer_segments_in_closed_loops() -> None:
     """The whole number that falls until nothing is left."""
     front, _, settings = initial_front("groin vault 30")
-    loop, left = np.empty(int(front.count[lists.SEGMENTS]) + 1, np.int64), np.inf
-    while len(live := np.flatnonzero(front.state[: front.count[lists.SEGMENTS]] != lists.GONE)):
+    loop, left = np.empty(int(front.counts.segments) + 1, np.int64), np.inf
+    while len(live := np.flatnonzero(front.state[: front.counts.segments] != lists.GONE)):
         assert len(live) < left
         left = len(live)
         count = gaps.gap_loop(front, int(live[0]), loop)
@@ -137,7 +137,7 @@ def test_the_segments_are_closed_loops_from_the_start_to_the_last_gap(
 
     def look_before_a_gap(front: Front, *others: Any) -> int:
         assert_closed_loops(front)
-        left.append(int((front.state[: front.count[lists.SEGMENTS]] != lists.GONE).sum()))
+        left.append(int((front.state[: front.counts.segments] != lists.GONE).sum()))
         return find(front, *others)
 
     monkeypatch.setattr(kernels, "advance", look_after_a_slice)

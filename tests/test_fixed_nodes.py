@@ -9,7 +9,7 @@ from rough import Rough, rough_disc, rough_sphere, same_topology
 from steps import boundary_of, optimized
 
 from scantruss import Grid, InputError, PointCloud, Settings
-from scantruss.constraints.fixed_nodes import check_positions
+from scantruss.constraints.fixed_nodes import check_fixed_positions
 from scantruss.surface.samples import sample_surface
 
 MAKERS: dict[str, Callable[[], Rough]] = {
@@ -153,6 +153,6 @@ def test_a_position_off_the_scan_comes_with_the_nearest_point() -> None:
     far = np.array([100.2, 200.1, 305.0])
     cloud, settings = PointCloud.from_array(points), Settings(length=0.3)
     with pytest.raises(InputError, match=r"; the nearest point is \(") as refused:
-        check_positions([far.tolist()], sample_surface(cloud, settings), settings.length)
+        check_fixed_positions([far.tolist()], sample_surface(cloud, settings), settings.length)
     named = np.array([float(word) for word in str(refused.value).rsplit("(", 1)[1].rstrip(")").split(",")])
     assert np.allclose(named, points[np.linalg.norm(points - far, axis=1).argmin()], atol=1e-6)

@@ -10,7 +10,7 @@ from marks import compiled_only
 
 import scantruss as st
 from scantruss.kernels.surface import folds
-from scantruss.kernels.surface.local_surface import NEAREST_SAMPLE, PATCH_COLUMNS, Surface, fit_patch
+from scantruss.kernels.surface.local_surface import SURFACE_PATCH, Surface, fit_patch
 
 pytestmark = pytest.mark.kernels
 
@@ -22,7 +22,7 @@ def surface_of(points: np.ndarray) -> Surface:
 
 def patch_at(surface: Surface, place: np.ndarray, strength: float = 1.0) -> tuple[np.ndarray, Surface]:
     """Return a patch fitted at a place, in two rows, and the surface."""
-    patches = np.zeros((2, PATCH_COLUMNS))
+    patches = np.zeros(2, SURFACE_PATCH)
     sample = int(np.argmin(np.linalg.norm(surface.mean - place, axis=1)))
     fit_patch(surface, patches[0], sample, tuple(place))
     folds.add_fold(surface, patches[0], folds.PLANES_REACH, strength)
@@ -63,7 +63,7 @@ def test_a_node_beside_a_fold_is_drawn_to_its_crest(rise: float) -> None:
     energies = [folds.fold_energy(patches, 0, x, 0.0, -rise * abs(x)) for x in np.linspace(-0.4, 0.4, 81)]
     assert abs(np.linspace(-0.4, 0.4, 81)[np.argmin(energies)]) < 0.15  # from 0.2
     beside = (0.1, 0.0, -0.1 * rise)
-    fit_patch(surface, patches[0], int(patches[0, NEAREST_SAMPLE]), beside)
+    fit_patch(surface, patches[0], patches[0].sample, beside)
     folds.add_fold(surface, patches[0], 0.4, 1.0)
     crest = folds.onto_crest(surface, patches[0], beside)
     assert np.hypot(crest[0], crest[2]) < np.hypot(beside[0], beside[2])
@@ -73,5 +73,5 @@ def test_a_gentle_bend_is_no_fold() -> None:
     rng = np.random.default_rng(2)
     x, y = rng.uniform(-3, 3, 4_000), rng.uniform(-3, 3, 4_000)
     patches, surface = patch_at(surface_of(np.column_stack([x, y, -0.1 * (x * x + y * y)])), np.zeros(3))
-    assert patches[0, folds.FOLD_WEIGHT] == 0.0 and folds.fold_energy(patches, 0, 0.3, 0.0, 0.4) == 0.0
+    assert patches[0].fold_weight == 0.0 and folds.fold_energy(patches, 0, 0.3, 0.0, 0.4) == 0.0
     assert folds.onto_crest(surface, patches[0], (0.3, 0.0, 0.1)) == (0.3, 0.0, 0.1)

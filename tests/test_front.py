@@ -172,10 +172,10 @@ def test_the_growth_of_the_arrays_makes_no_difference(name: str, method: str, mo
     def small(samples: SurfaceSamples, own: st.Settings) -> lists.Front:
         front = large(samples, own)
         room = len(front.nodes)
-        arrays = [a[: len(a) * need // room].copy() for a in front[:-2]]
+        arrays = [a[: len(a) * need // room].copy() for a in front[:-3]]
         mean = samples.surface.mean
         boxes = new_boxes(mean.min(axis=0), mean.max(axis=0), own.length, need, need)
-        return lists.Front._make([*arrays, front.count, boxes])
+        return lists.Front._make([*arrays, front.counts, front.sharp_edges, boxes])
 
     def count(front: Front) -> lists.Front:
         grown.append(len(front.nodes))

@@ -164,7 +164,7 @@ def test_a_move_and_its_opposite_leave_the_grid_as_it_was(make: Callable[..., Ro
         if kernels.may_flip(net, v, u):
             right, left = kernels.wings(net, v, u)
             kernels.flip(net, v, u)
-            assert kernels.place_of(net, v, u) < 0 and kernels.place_of(net, right, left) >= 0
+            assert kernels.place_in_ring(net, v, u) < 0 and kernels.place_in_ring(net, right, left) >= 0
             kernels.flip(net, right, left)
         if kernels.may_split(net, v, u):
             m = kernels.split(net, v, u)

@@ -123,6 +123,17 @@ def test_constants_and_types_of_two_modules_have_different_names() -> None:
     assert [word for word, count in found.items() if count > 1] == []
 
 
+def test_functions_of_two_modules_have_different_names() -> None:
+    """Unless one is the kernel of the other, or its command."""
+    found = Counter(
+        (word, next((room for room in ("kernels", "cli") if name.startswith(room)), ""))
+        for name in MODULES
+        for word, node in defined_in(name)
+        if isinstance(node, ast.FunctionDef) and word[0] != "_"
+    )
+    assert [word for (word, _), count in found.items() if count > 1] == []
+
+
 def test_what_is_defined_is_used_outside_the_tests() -> None:
     """By the package, benchmarks and scripts, or it is named in the documentation."""
     root = SOURCE.parents[1]

@@ -49,7 +49,7 @@ OTHER = {
 
 
 @pytest.mark.parametrize("name", SMOOTH)
-def test_a_smooth_scan_has_larger_sites(name: str) -> None:
+def test_a_smooth_scan_has_larger_samples(name: str) -> None:
     samples = samples_of(SMOOTH[name]())
     assert samples.smooth and apart(samples) == pytest.approx(SMOOTH_SAMPLE_SPACING)
     finer = samples_of(SMOOTH[name](), box_size=SAMPLE_SPACING)
@@ -85,7 +85,7 @@ def test_flatter_ridges_that_are_asked_for_are_seen() -> None:
 @pytest.mark.kernels
 @settings(max_examples=10)
 @given(strategies.integers(0, 10_000), strategies.floats(2.0, 60.0))
-def test_uneven_sites_are_those_of_a_plain_loop(seed: int, angle: float) -> None:
+def test_uneven_samples_are_those_of_a_plain_loop(seed: int, angle: float) -> None:
     """The normal of a neighbour, mirrored at the plane half-way, against that of the sample; the sign of neither counts."""
     rng = np.random.default_rng(seed)
     points = np.column_stack([rng.uniform(0, 3, (150, 2)), 0.1 * rng.normal(size=150)])
@@ -104,7 +104,7 @@ def test_uneven_sites_are_those_of_a_plain_loop(seed: int, angle: float) -> None
 
 
 @pytest.mark.parametrize("effort", ["quick", "normal"])
-def test_the_grid_of_larger_sites_lies_on_the_scan_as_that_of_the_usual_ones(effort: str) -> None:
+def test_the_grid_of_larger_samples_lies_on_the_scan_as_that_of_the_usual_ones(effort: str) -> None:
     """Noisy domes: the same topology; nodes no farther from the true sphere, boundary nodes no farther from the true circle."""
     dome, off, rim = cap(6.0, 0.9, 0.06), [], []
     for seed, size in product(range(3), (None, SAMPLE_SPACING)):
@@ -120,7 +120,7 @@ def test_the_grid_of_larger_sites_lies_on_the_scan_as_that_of_the_usual_ones(eff
 
 
 @pytest.mark.kernels
-def test_places_find_the_site_nearest_to_them_from_any_near_by() -> None:
+def test_places_find_the_sample_nearest_to_them_from_any_near_by() -> None:
     surface = samples_of(sheet(4, 4, 0.1), box_size=0.4).surface
     rng = np.random.default_rng(0)
     places = np.column_stack([rng.uniform(-1.8, 1.8, (60, 2)), np.zeros(60)])

@@ -12,10 +12,7 @@ from small_clouds import ball, samples_of, sheet, turn_of
 from typed import xyz
 
 from scantruss.kernels.surface.local_surface import (
-    HEIGHTS,
-    NORMAL,
-    PATCH_COLUMNS,
-    TANGENT,
+    SURFACE_PATCH,
     Surface,
     fit_patch,
     flood,
@@ -24,6 +21,7 @@ from scantruss.kernels.surface.local_surface import (
     patch_normal,
     walk,
 )
+from scantruss.runtime.jit import new_record
 
 
 @cache
@@ -38,7 +36,7 @@ def nearest_sample(surface: Surface, place: Iterable[float]) -> int:
 
 def foot_of(surface: Surface, place: Iterable[float], sample: int | None = None) -> np.ndarray:
     """Foot of a place by a fresh patch, on the sheet of a sample or of the nearest one."""
-    patch, at = np.zeros(PATCH_COLUMNS), xyz(place)
+    patch, at = new_record(SURFACE_PATCH), xyz(place)
     fit_patch(surface, patch, nearest_sample(surface, at) if sample is None else sample, at)
     return np.array(onto_patch(patch, at))
 
@@ -56,7 +54,7 @@ def test_planes_are_reproduced_exactly(seed: int) -> None:
     turn = turn_of(seed)
     surface = samples_of(sheet(5, 5, 0.25, seed=seed) @ turn.T).surface
     for place in inner_places(np.random.default_rng(seed), 5.0, 3):
-        patch = np.zeros(PATCH_COLUMNS)
+        patch = new_record(SURFACE_PATCH)
         at = tuple(turn @ place)
         fit_patch(surface, patch, nearest_sample(surface, at), at)
         foot = np.array(onto_patch(patch, at))
@@ -75,9 +73,9 @@ def test_planes_are_reproduced_exactly_at_their_rim_too() -> None:
 @pytest.mark.parametrize("place", [(0.5, 0.2, 0.6), (-0.6, 0.4, -0.3), (0.3, -0.7, 0.5)])
 def test_the_foot_is_the_nearest_place_of_the_patch(place: tuple[float, float, float]) -> None:
     """Aside of the middle, where the patch is steep: the nearest of a fine raster of its places."""
-    patch = np.zeros(PATCH_COLUMNS)
+    patch = new_record(SURFACE_PATCH)
     c = (0.05, 0.1, -0.2, 0.3, 0.1, -0.25)
-    patch[NORMAL : NORMAL + 3], patch[TANGENT : TANGENT + 3], patch[HEIGHTS : HEIGHTS + 6] = (0, 0, 1), (1, 0, 0), c
+    patch.normal, patch.tangent, patch.heights = (0, 0, 1), (1, 0, 0), c
     x, y = np.meshgrid(np.linspace(-1.5, 1.5, 1501), np.linspace(-1.5, 1.5, 1501))
     z = c[0] + c[1] * x + c[2] * y + c[3] * x * x + c[4] * x * y + c[5] * y * y
     away = np.sqrt((x - place[0]) ** 2 + (y - place[1]) ** 2 + (z - place[2]) ** 2)
@@ -124,7 +122,7 @@ def test_the_normal_of_a_patch_is_that_of_the_ball() -> None:
     surface = samples_of(ball(3.0, 1500)).surface
     for place in np.random.default_rng(5).normal(size=(5, 3)):
         place = 3.0 * place / np.linalg.norm(place)
-        patch = np.zeros(PATCH_COLUMNS)
+        patch = new_record(SURFACE_PATCH)
         fit_patch(surface, patch, nearest_sample(surface, place), tuple(place))
         beside = place + 0.2 * np.cross(place / 3.0, [0.6, 0.0, 0.8])
         for p in (place, beside):
@@ -207,7 +205,7 @@ def slit_sheet() -> Surface:
 
 @pytest.mark.kernels
 @pytest.mark.parametrize("reach", [1.2, 1.6, 2.5, 4.0])
-def test_sites_on_both_sides_of_a_slit_are_linked_if_the_way_around_its_end_is_within_reach(reach: float) -> None:
+def test_samples_on_both_sides_of_a_slit_are_linked_if_the_way_around_its_end_is_within_reach(reach: float) -> None:
     surface = slit_sheet()
     rng = np.random.default_rng(int(10 * reach))
     x, y = surface.mean[:, 0], surface.mean[:, 1]

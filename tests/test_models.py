@@ -16,7 +16,7 @@ from small_grids import cloud_over, dome, fan, make_grid
 from test_convert import UTM, roof
 
 import scantruss as st
-from scantruss.export.glb import SIDES, colours_of, linear
+from scantruss.export.glb import SIDES_OF_TUBE, colours_of, linear
 from scantruss.export.model import model_of_truss
 from scantruss.export.part21 import ifc_guid, quoted, real
 from scantruss.export.style import FileStyle
@@ -85,10 +85,10 @@ def test_glb_stands_upright_where_the_grid_is(kind: str, tmp_path: Path) -> None
     panels = trimesh.transform_points(parts["panels"].vertices, placed["panels"])
     assert np.abs(panels[parts["panels"].faces] - nodes[grid.triangles]).max() < 1e-5
     tubes = trimesh.transform_points(parts["members"].vertices, placed["members"])
-    assert len(parts["members"].faces) == 2 * SIDES * len(grid.edges)
+    assert len(parts["members"].faces) == 2 * SIDES_OF_TUBE * len(grid.edges)
     if kind == "structure":
         ends = nodes[grid.edges][:, :, None]
-        first = tubes.reshape(len(grid.edges), 2, SIDES, 3)
+        first = tubes.reshape(len(grid.edges), 2, SIDES_OF_TUBE, 3)
         np.testing.assert_allclose(np.linalg.norm(first - ends, axis=-1), 0.1143 / 2, atol=1e-5)
         along = np.einsum("mesx,mx->mes", first - ends, (ends[:, 1] - ends[:, 0])[:, 0])
         assert np.abs(along).max() < 1e-4

@@ -11,7 +11,7 @@ from small_grids import dome
 from typed import known
 
 import scantruss as st
-from scantruss.report.notebook import cloud_picture, grid_picture, show_pictures
+from scantruss.report.notebook import cloud_picture, grid_picture, settings_table, show_pictures
 
 
 def test_they_say_in_one_line_what_they_are() -> None:
@@ -24,6 +24,22 @@ def test_they_say_in_one_line_what_they_are() -> None:
     assert all("\n" not in words and len(words) < 100 for words in (said, cloud))
 
 
+def test_so_does_each_step() -> None:
+    cloud, settings = (
+        st.PointCloud.from_array(make("two_holes", 4000).points),
+        st.Settings(length=make("two_holes", 4000).length),
+    )
+    surface, boundary = st.find_boundary(st.sample_surface(cloud, settings), settings)
+    boundary, constraints = st.find_constraints(
+        surface, boundary, settings.replace(fixed=[surface.scan[0] + surface.origin])
+    )
+    assert repr(surface).startswith("SurfaceSamples(") and "samples of 4,000 points, pieces 1, area " in repr(surface)
+    assert repr(boundary).startswith(f"Boundary({len(boundary.loops)} loops: ") and repr(boundary).count(
+        "(hole)"
+    ) == len(boundary.internal)
+    assert repr(constraints) == "Constraints(1 fixed nodes, 0 fixed lines, 0 ridges)"
+
+
 def test_notebooks_show_a_picture_of_each() -> None:
     kept = {}
 
@@ -33,7 +49,7 @@ def test_notebooks_show_a_picture_of_each() -> None:
 
     class Shell:
         class display_formatter:  # noqa: N801
-            formatters = {"image/png": Formatter()}  # noqa: RUF012
+            formatters = {"image/png": Formatter(), "text/html": Formatter()}  # noqa: RUF012
 
     show_pictures(Shell())
     shown: list[tuple[Any, Callable[[Any], bytes | None]]] = [
@@ -44,6 +60,10 @@ def test_notebooks_show_a_picture_of_each() -> None:
         kind = type(value)
         assert kept[kind.__module__, kind.__name__] is picture
         assert known(picture(value)).startswith(b"\x89PNG")
+    settings = st.Settings(length=4.7, fixed=[(k, 0.0, 0.0) for k in range(40)])
+    assert kept[type(settings).__module__, "Settings"] is settings_table
+    table = settings_table(settings)
+    assert table.count("<tr>") == 2 and "4.7" in table and "desired member length" in table and "..." in table
     assert grid_picture(dome().replace(triangles=np.zeros((0, 3), np.int64))) is None
 
 

@@ -67,7 +67,7 @@ def test_the_nearest_of_six_turns_is_that_of_a_search_through_all(angle: float, 
 @pytest.mark.kernels
 @settings(max_examples=40, deadline=None)
 @given(places, angles, angles)
-def test_the_place_between_two_posts_lies_in_both_planes(
+def test_the_place_between_two_nodes_lies_in_both_planes(
     place: tuple[float, float], first: float, second: float
 ) -> None:
     p, q = np.array([0.0, 0.0, 0.0]), np.array([*place, 0.3])
@@ -81,7 +81,7 @@ def test_the_place_between_two_posts_lies_in_both_planes(
 
 
 @pytest.mark.parametrize("name", ["plate", "ball"])
-def test_posts_that_are_smoothed_at_once_are_not_linked(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_nodes_that_are_smoothed_at_once_are_not_linked(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(laying, "SAMPLES_FOR_THREADS", 300)
     points = sheet(12.0, 8.0, 0.15, seed=1) if name == "plate" else ball(3.0, 8000)
     _, scan = scanned(points, 0.5)
@@ -165,7 +165,7 @@ def test_directions_of_neighbours_agree_but_at_a_few_singular_places(
     assert np.linalg.norm(posts.direction, axis=1) == pytest.approx(1.0)
 
 
-def test_every_site_has_a_post_within_reach_and_posts_keep_their_distance() -> None:
+def test_every_sample_has_a_node_within_reach_and_nodes_keep_their_distance() -> None:
     shape = make("cloth", 20_000)
     _, scan = scanned(shape.points, shape.length)
     surface = scan.samples.surface

@@ -108,7 +108,7 @@ def test_few_or_coinciding_points_are_no_strays() -> None:
     assert not outliers.find_outliers(np.repeat(np.eye(3), 30, axis=0), 3.0)[:0].any()
 
 
-def test_parts_of_the_sites_find_the_same_neighbours() -> None:
+def test_parts_of_the_samples_find_the_same_neighbours() -> None:
     points = np.random.default_rng(0).uniform(0, 1, (500, 3))
     boxes = new_boxes(points.min(axis=0), points.max(axis=0), 0.2, 500, 500)
     kernels.put_all(boxes, points, np.arange(500))

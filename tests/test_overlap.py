@@ -15,7 +15,7 @@ from scantruss.kernels.scan import blend as blending
 from scantruss.kernels.scan import features as feature_kernels
 from scantruss.kernels.scan import overlap as kernels
 from scantruss.scan.register.features import ANGLE_BINS, features_from_behind, find_features
-from scantruss.scan.register.fine import align, judge, solve_step
+from scantruss.scan.register.fine import align, judge_pair, solve_step
 from scantruss.scan.register.matching import fit_pose
 from scantruss.scan.register.poses import invert, move, quaternion_of, small_motion, turn_by
 from scantruss.scan.register.views import View, boxes_around, make_view
@@ -162,11 +162,11 @@ def test_judging_counts_what_agrees_and_what_does_not(views: tuple[View, View, n
                 agreeing, squares = agreeing + 1, squares + off**2
             else:
                 against += 1
-        found = kernels.judge(
+        found = kernels.judge_overlap(
             a.points, a.normals, b.points, b.normals, b.on_boundary, b.boxes, there, 1.0, SPACING, near, reach
         )
         assert found == pytest.approx((agreeing, against, squares))
-    right, wrong = (judge(a, b, p, 1.0, near, reach) for p in (pose, there))
+    right, wrong = (judge_pair(a, b, p, 1.0, near, reach) for p in (pose, there))
     assert right.agreement > 0.9 > wrong.agreement and right.score > wrong.score
 
 

@@ -12,7 +12,7 @@ import pytest
 from browser import open_page
 
 import scantruss as st
-from scantruss.export.drawing.structure import OVERUSED
+from scantruss.export.drawing.structure import OVERUSED_COLOUR
 from scantruss.export.formats import losses, model_of
 from scantruss.export.page import encode_page
 from scantruss.export.style import FileStyle
@@ -94,7 +94,7 @@ def test_more_than_one_has_a_colour_of_its_own_and_a_small_scan_is_held_whole() 
     solution = st.solve(st.Truss.from_grid(sheet(), section="CHS33.7x3.2", supports="boundary", loads="snow:50kN/m2"))
     page = encode_page(model_of(solution, report=report_structure(solution)), FileStyle())
     (used,) = (each for each in data_of(page)["colorings"] if each["name"] == "utilization")
-    assert used["most"] == [1.0, OVERUSED]
+    assert used["most"] == [1.0, OVERUSED_COLOUR]
     for count, said in ((60_000, []), (60_001, ["HTML holds no more than 60,000 points of the scan"])):
         cloud = PointCloud(np.zeros((count, 3)), np.zeros(3))
         assert losses(model_of(sheet(), cloud=cloud), "a.html") == said

@@ -11,12 +11,12 @@ import naive
 import numpy as np
 import pytest
 from small_clouds import HandFront, cap, ring, sheet
+from small_grids import flipped_edges
 from steps import boundary_of, front_of, steps_of
 
 import scantruss as st
 from scantruss.boundary.find import characteristic_points
 from scantruss.front.start import new_front, start_front
-from scantruss.improve.flips import flip_edges
 from scantruss.kernels.front import cases, fits
 from scantruss.kernels.front import front as lists
 from scantruss.kernels.front.advance import advance_by_cases
@@ -165,7 +165,7 @@ def test_section_3_4_step_1_the_optimal_point(w1: float) -> None:
     """
     hand = HandFront(square(), length=1.8, length_weight=w1, search_range=3.0)
     assert cases.optimal_point(hand.surface, hand.front, AB, hand.rules, hand.patch)
-    found = hand.front.nodes[hand.front.count[lists.NODES]]
+    found = hand.front.nodes[hand.front.counts.nodes]
     expected = naive.optimal_point(
         hand.surface.points, three(*A), three(*B), (0, 0, 1), 1.8, w1, hand.rules.search_range
     )
@@ -414,7 +414,7 @@ def test_section_3_6_internal_boundaries_are_active_or_inactive(way: str) -> Non
     samples, boundary, constraints = steps_of(cloud, ways[way])
     assert (len(boundary.external), len(boundary.internal)) == (1, 1)
     front = start_front(new_front(samples, ways[way]), samples, boundary, constraints, ways[way])
-    count = front.count[lists.SEGMENTS]
+    count = front.counts.segments
     away = np.linalg.norm(front.nodes[front.tail[:count], :2], axis=1)
     assert (front.state[:count][away > 4] == lists.ACTIVE).all()
     assert (front.state[:count][away < 4] == (lists.ACTIVE if way == "all" else lists.INACTIVE)).all()
@@ -468,11 +468,11 @@ def test_section_4_1_flips_make_the_smallest_angle_as_large_as_they_can() -> Non
     """A rhombus of diagonals 4 and 2: the long one leaves 27 degrees, the short one 53; the short one is taken and stays."""
     nodes = np.array([(0.0, 0.0, 0.0), (2.0, -1.0, 0.0), (4.0, 0.0, 0.0), (2.0, 1.0, 0.0)])
     wide = st.Grid(nodes, np.array([(0, 1, 2), (0, 2, 3)]), np.zeros(4, bool), np.zeros(3))
-    flipped, count = flip_edges(wide)
+    flipped, count = flipped_edges(wide)
     assert count == 1
     assert {frozenset(t) for t in flipped.triangles.tolist()} == {frozenset({0, 1, 3}), frozenset({1, 2, 3})}
     assert naive.directed_edges(flipped.triangles).keys() >= {(0, 1), (1, 2), (2, 3), (3, 0)}
-    again, count = flip_edges(flipped)
+    again, count = flipped_edges(flipped)
     assert count == 0 and again.triangles.tolist() == flipped.triangles.tolist()
 
 

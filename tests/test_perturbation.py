@@ -42,7 +42,7 @@ def energy_of(mesh: WorkingMesh, scratch: Scratch) -> float:
 
 
 def perturb(mesh: WorkingMesh, scratch: Scratch, area: Area, v: int, worth: float, temperature: float = 0.0) -> bool:
-    listed = kernels.list_area(mesh.net, mesh.patches, area, v) == kernels.LISTED
+    listed = kernels.list_area(mesh.net, mesh.patches, area, v) == kernels.AREA_LISTED
     return listed and kernels.perturb(
         mesh.net,
         mesh.patches,
@@ -59,14 +59,14 @@ def perturb(mesh: WorkingMesh, scratch: Scratch, area: Area, v: int, worth: floa
 
 
 @pytest.mark.kernels
-def test_a_kick_that_does_not_pay_leaves_no_trace(settled: tuple[Rough, WorkingMesh, Scratch, Area]) -> None:
+def test_a_perturbation_that_does_not_pay_leaves_no_trace(settled: tuple[Rough, WorkingMesh, Scratch, Area]) -> None:
     """If a node more or less may cost nothing, at most what moves no node pays."""
     _, mesh, scratch, area = settled
     net = mesh.net
     before, free, patches = trace(net), int(net.spare[0]), mesh.patches[net.degree > 0].tobytes()
     perturbed = 0
     for v in np.flatnonzero(net.degree > 0)[::2].tolist():
-        assert kernels.list_area(net, mesh.patches, area, v) == kernels.LISTED
+        assert kernels.list_area(net, mesh.patches, area, v) == kernels.AREA_LISTED
         perturbed += kernels.move_at_random(net, mesh.patches, mesh.curves, scratch, area, mesh.length)
         kernels.settle_area(net, mesh.patches, mesh.curves, area, mesh.length, LENGTH_WEIGHT)
         kernels.search_area(net, mesh.patches, mesh.curves, scratch, area, mesh.length, LENGTH_WEIGHT, 0.05)
@@ -83,7 +83,7 @@ def test_the_energy_of_the_area_changes_by_as_much_as_that_of_the_grid(
     _, mesh, scratch, area = settled
     net = mesh.net
     for v in np.flatnonzero(net.degree > 0)[::8].tolist():
-        assert kernels.list_area(net, mesh.patches, area, v) == kernels.LISTED
+        assert kernels.list_area(net, mesh.patches, area, v) == kernels.AREA_LISTED
         before = (
             kernels.area_energy(net, mesh.patches, scratch, area, mesh.length, LENGTH_WEIGHT),
             energy_of(mesh, scratch),
@@ -98,7 +98,7 @@ def test_the_energy_of_the_area_changes_by_as_much_as_that_of_the_grid(
         assert after[0] - before[0] == pytest.approx(after[1] - before[1], abs=1e-9)
 
 
-def test_a_kick_that_pays_lowers_the_energy_by_more_than_its_nodes_are_worth(
+def test_a_perturbation_that_pays_lowers_the_energy_by_more_than_its_nodes_are_worth(
     settled: tuple[Rough, WorkingMesh, Scratch, Area],
 ) -> None:
     rough, mesh, scratch, area = settled
@@ -114,7 +114,7 @@ def test_a_kick_that_pays_lowers_the_energy_by_more_than_its_nodes_are_worth(
     assert same_topology(rough.grid, mesh.to_grid(rough.grid))
 
 
-def test_heat_lets_a_kick_cost_something(settled: tuple[Rough, WorkingMesh, Scratch, Area]) -> None:
+def test_heat_lets_a_perturbation_cost_something(settled: tuple[Rough, WorkingMesh, Scratch, Area]) -> None:
     _, mesh, scratch, area = settled
     rises = 0
     for v in np.flatnonzero(mesh.net.degree > 0).tolist():
@@ -155,7 +155,7 @@ def test_a_defect_is_left_alone(settled: tuple[Rough, WorkingMesh, Scratch, Area
     _, mesh, _, area = settled
     mesh.net.kind[:] = LOCKED
     first = int(np.flatnonzero(mesh.net.degree > 0)[0])
-    assert kernels.list_area(mesh.net, mesh.patches, area, first) == kernels.UNFIT
+    assert kernels.list_area(mesh.net, mesh.patches, area, first) == kernels.AREA_UNFIT
 
 
 @pytest.mark.kernels
@@ -163,13 +163,13 @@ def test_an_area_that_reaches_out_of_bounds_is_told(settled: tuple[Rough, Workin
     _, mesh, _, area = settled
     net = mesh.net
     first = int(np.flatnonzero(net.degree > 0)[0])
-    assert kernels.list_area(net, mesh.patches, area, first) == kernels.LISTED
+    assert kernels.list_area(net, mesh.patches, area, first) == kernels.AREA_LISTED
     around = area.around[: area.gathered[0]].copy()
     for out in around[:: max(len(around) // 5, 1)].tolist():
         area.out[out] = 1
-        assert kernels.list_area(net, mesh.patches, area, first) == kernels.OUT_OF_BOUNDS
+        assert kernels.list_area(net, mesh.patches, area, first) == kernels.AREA_OUT_OF_BOUNDS
         area.out[out] = 0
-    assert kernels.list_area(net, mesh.patches, area, first) == kernels.LISTED
+    assert kernels.list_area(net, mesh.patches, area, first) == kernels.AREA_LISTED
 
 
 @pytest.mark.kernels
@@ -180,7 +180,7 @@ def test_a_net_is_as_before_until_a_member_of_the_area_changes(
     net, changed = mesh.net, 0
     for v in np.flatnonzero(net.degree > 0)[::4].tolist():
         before = trace(net)[:2]
-        assert kernels.list_area(net, mesh.patches, area, v) == kernels.LISTED
+        assert kernels.list_area(net, mesh.patches, area, v) == kernels.AREA_LISTED
         assert kernels.is_as_before(net, area)
         made = kernels.move_at_random(net, mesh.patches, mesh.curves, scratch, area, mesh.length)
         used, rings = trace(net)[:2]

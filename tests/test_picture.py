@@ -16,11 +16,11 @@ from typed import known, xyz
 
 import scantruss as st
 from scantruss.export.drawing.camera import choose_camera, map_depth
-from scantruss.export.drawing.left_out import AMBER, RED, VIOLET, shown_points
-from scantruss.export.drawing.legend import FAULT, marks_of, round_bar, scale_bar
+from scantruss.export.drawing.left_out import LEFT_OUT_COLOUR, NO_GRID_COLOUR, OUT_OF_REACH_COLOUR, shown_points
+from scantruss.export.drawing.legend import FAULT_COLOUR, places_marked, round_bar, scale_bar
 from scantruss.export.drawing.picture import PANELS_SIZE, PICTURE_SIZE, draw_panels, encode_picture
-from scantruss.export.drawing.sheet import PICTURE, encode_sheet
-from scantruss.export.drawing.strokes import FIXED_NODE_COLOUR, PAPER
+from scantruss.export.drawing.sheet import PICTURE_OF_SHEET, encode_sheet
+from scantruss.export.drawing.strokes import FIXED_NODE_COLOUR, PAPER_COLOUR
 from scantruss.export.drawing.style import PictureStyle
 from scantruss.export.solid import build_solid
 from scantruss.grid.certificate import Certificate, Fault
@@ -44,7 +44,7 @@ def test_picture_is_full_and_framed(make: Callable[[], st.Grid]) -> None:
     grid = make()
     picture = pixels(encode_picture(grid, cloud_over(grid)))
     assert picture.shape == (PICTURE_SIZE[1], PICTURE_SIZE[0], 3)
-    ink = np.abs(picture - np.round(PAPER * 255)).max(axis=2) > 40
+    ink = np.abs(picture - np.round(PAPER_COLOUR * 255)).max(axis=2) > 40
     assert ink.mean() > 0.05
     assert not ink[:, :60].any() and not ink[:, -60:].any() and not ink[:50].any()
 
@@ -141,7 +141,7 @@ def test_panels_show_scan_grid_and_solid(tmp_path: Path) -> None:
     picture = pixels((tmp_path / "a.png").read_bytes())
     assert picture.shape == (PANELS_SIZE[1], PANELS_SIZE[0], 3)
     for panel in np.split(picture, 3, axis=1):
-        assert (np.abs(panel - np.round(PAPER * 255)).max(axis=2) > 40).mean() > 0.01
+        assert (np.abs(panel - np.round(PAPER_COLOUR * 255)).max(axis=2) > 40).mean() > 0.01
 
 
 def test_flat_and_empty_grids_are_drawn() -> None:
@@ -159,9 +159,11 @@ def test_what_the_grid_leaves_out_is_coloured_and_named_and_outliers_do_not_shri
     total = len(shown.followed) + sum(len(part.points) for part in shown.missed)
     assert total == len(near)
     bare, full = (pixels(encode_picture(grid, c)) for c in (st.PointCloud.from_array(points), cloud))
-    for colour in (RED, AMBER):
+    for colour in (OUT_OF_REACH_COLOUR, LEFT_OUT_COLOUR):
         assert has_colour(full, colour) >= has_colour(bare, colour)
-    assert has_colour(full, RED) + has_colour(full, AMBER) > has_colour(bare, RED) + has_colour(bare, AMBER)
+    assert has_colour(full, OUT_OF_REACH_COLOUR) + has_colour(full, LEFT_OUT_COLOUR) > has_colour(
+        bare, OUT_OF_REACH_COLOUR
+    ) + has_colour(bare, LEFT_OUT_COLOUR)
 
 
 def scan_and_grid() -> tuple[np.ndarray, st.Grid]:
@@ -178,7 +180,7 @@ def test_scan_beyond_the_grid_is_red_and_inside_the_picture() -> None:
     shown = shown_points(part, st.PointCloud.from_array(more))
     assert sum(len(p.points) for p in shown.missed if p.framed) > 3900
     picture = pixels(encode_picture(part, st.PointCloud.from_array(more)))
-    assert has_colour(picture, RED) + has_colour(picture, VIOLET) > 500
+    assert has_colour(picture, OUT_OF_REACH_COLOUR) + has_colour(picture, NO_GRID_COLOUR) > 500
 
 
 @pytest.mark.parametrize(
@@ -259,7 +261,7 @@ def test_size_and_number_of_views_are_as_asked() -> None:
     both = pixels(encode_picture(grid, style=PictureStyle(views=("top", "front"))))
     assert both.shape == (PANELS_SIZE[1], PANELS_SIZE[0], 3)
     for half in np.split(both, 2, axis=1):
-        assert (np.abs(half - np.round(PAPER * 255)).max(axis=2) > 40).mean() > 0.03
+        assert (np.abs(half - np.round(PAPER_COLOUR * 255)).max(axis=2) > 40).mean() > 0.03
     for bad in ({"views": ("sideways",)}, {"views": ("10,95",)}, {"views": ()}, {"size": (10, 5000)}):
         with pytest.raises(st.InputError):
             PictureStyle(**bad)
@@ -275,9 +277,9 @@ def test_places_of_faults_and_warnings_are_marked_with_their_words() -> None:
         ("reach", "pieces", "scan_pieces", "boundary_loops", "scan_loops", "euler", "handles"), 1
     )
     found = Certificate(unit="", manifold=True, orientable=True, **nothing, faults=(fault,), warnings=(warning,))
-    assert [mark.words for mark in marks_of(grid.replace(certificate=found))] == [fault.words, warning.words]
+    assert [mark.words for mark in places_marked(grid.replace(certificate=found))] == [fault.words, warning.words]
     plain, marked = (pixels(encode_picture(g)) for g in (grid, grid.replace(certificate=found)))
-    assert has_colour(marked, FAULT) > 20 + has_colour(plain, FAULT)
+    assert has_colour(marked, FAULT_COLOUR) > 20 + has_colour(plain, FAULT_COLOUR)
 
 
 @pytest.mark.parametrize("make", [icosahedron, dome])
@@ -325,7 +327,7 @@ def test_more_places_of_a_fault_are_small_rings_of_its_colour() -> None:
     for also in ((), tuple(places[1:])):
         fault = Fault("short", "has a member of 0.30 desired lengths", places[0], also)
         marked = grid.replace(certificate=replace(none, faults=(fault,)))
-        counts.append(has_colour(pixels(encode_picture(marked, cloud)), FAULT))
+        counts.append(has_colour(pixels(encode_picture(marked, cloud)), FAULT_COLOUR))
     assert counts[1] > counts[0] + 30
     again = Certificate.from_dict(json.loads(json.dumps(known(marked.certificate).to_dict())))
     assert again.faults == known(marked.certificate).faults
@@ -338,7 +340,7 @@ def test_a_sheet_shows_all_of_each_picture() -> None:
     Image.fromarray(image).save(stream, "PNG")
     sheet = np.asarray(Image.open(io.BytesIO(encode_sheet([("one", stream.getvalue())] * 3))).convert("RGB"), int)
     red = (np.abs(sheet - [255, 0, 0]) < 60).all(axis=2)
-    wide, high = PICTURE
+    wide, high = PICTURE_OF_SHEET
     for left in range(0, 3 * wide, wide):
         framed = red[-high:, left : left + wide]
         assert framed[[3, -4]].all() and framed[:, [3, -4]].all()

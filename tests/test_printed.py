@@ -17,7 +17,7 @@ import scantruss as st
 from scantruss.cli.main import main
 from scantruss.export.engraving import letter_height
 from scantruss.export.printed.nodes import build_nodes
-from scantruss.export.printed.parts import Joint, build_parts, check_apart, check_joint, divide
+from scantruss.export.printed.parts import Joint, build_parts, check_apart, check_joint, divide_for_bed
 from scantruss.export.printed.plates import PrintedPart, lay_out, pack
 from scantruss.export.printed.write import print_parts
 from scantruss.export.solid import as_solid, build_solid, is_watertight, unite
@@ -116,7 +116,7 @@ def test_joints_have_the_clearance_and_slide_together_along_one_direction(name: 
     parts = parts_of(name, bed=bed)
     part_of = np.array([part_at(parts, node) for node in range(len(grid.nodes))])
     joint = check_joint(grid, 3.0, 6.0, 1.0, 0.3)
-    same, wanted = divide(grid.nodes, grid.edges, bed, 3.0, joint.reach)
+    same, wanted = divide_for_bed(grid.nodes, grid.edges, bed, 3.0, joint.reach)
     np.testing.assert_array_equal(same, part_of)
     found = 0
     for a, b in combinations(range(len(parts)), 2):

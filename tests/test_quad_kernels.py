@@ -9,8 +9,12 @@ from rough import curve_of, no_boundary
 from scantruss.kernels.boundary.curves import Curves
 from scantruss.kernels.cells.collapse import collapse_edges
 from scantruss.kernels.cells.quads import (
-    FLAT,
+    FREE_NODE,
+    RESTING_NODE,
     SAG_REACH,
+    SLIDING_NODE,
+    STRAIGHT_COST,
+    QuadNet,
     corner_energy,
     energy_of_quads,
     node_energy,
@@ -20,13 +24,12 @@ from scantruss.kernels.cells.quads import (
     side_energy,
     way_on_curve,
 )
-from scantruss.kernels.cells.trial import TRIAL_SWEEPS, QuadNet, shares_of, try_quads
-from scantruss.kernels.surface.local_surface import CENTRE, NORMAL, PATCH_COLUMNS, TANGENT
+from scantruss.kernels.cells.trial import TRIAL_SWEEPS, shares_of, try_quads
+from scantruss.kernels.surface.local_surface import SURFACE_PATCH
 
 pytestmark = pytest.mark.kernels
 SIZE = 4  # squares along a side
 LENGTHS, ANGLES = 3.0, 0.5
-FREE, ALONG, AT_REST = 0, 1, 2
 
 
 class Lattice:
@@ -37,14 +40,14 @@ class Lattice:
         at = np.arange(row * row)
         self.squares = np.column_stack([at % row, at // row, 0 * at]).astype(float)
         rim = (at % row % SIZE == 0) | (at // row % SIZE == 0)
-        self.at_boundary, self.held = rim, np.where(rim, AT_REST, FREE)
+        self.at_boundary, self.held = rim, np.where(rim, RESTING_NODE, FREE_NODE)
         corner = np.array([x + row * y for y in range(SIZE) for x in range(SIZE)])
         self.quads = np.column_stack([corner, corner + 1, corner + row + 1, corner + row])
         self.nodes = self.squares.copy()
         self.nodes[~rim, :2] += rng.uniform(-amount, amount, (int((~rim).sum()), 2))
-        self.patches = np.zeros((len(at), PATCH_COLUMNS))
-        self.patches[:, CENTRE : CENTRE + 3] = self.squares
-        self.patches[:, NORMAL + 2] = self.patches[:, TANGENT] = 1.0
+        self.patches = np.zeros(len(at), SURFACE_PATCH)
+        self.patches["centre"] = self.squares
+        self.patches["normal"][:, 2] = self.patches["tangent"][:, 0] = 1.0
         self.desired = np.ones(len(at))
         self.curves, self.curve, self.arc = no_boundary(), np.zeros(len(at), np.int64), np.zeros(len(at))
         self.share = np.empty((len(self.quads), 4))
@@ -53,19 +56,26 @@ class Lattice:
         self.of, self.degree = order // 4, np.bincount(self.quads.ravel())
         self.start = np.concatenate([[0], np.cumsum(self.degree)])
 
+    @property
+    def net(self) -> QuadNet:
+        """What the kernels take."""
+        at = np.full((len(self.nodes), 4), -1)
+        for v, (begin, end) in enumerate(pairwise(self.start.tolist())):
+            at[v, : end - begin] = self.of[begin:end]
+        return QuadNet(
+            self.nodes, self.quads, at, self.degree, self.held, self.curve, self.arc, self.patches, self.curves,
+            self.desired, np.zeros(len(self.nodes) + len(self.quads), np.int64), np.zeros(1, np.int64),
+        )  # fmt: skip
+
     def energy(self) -> float:
         out = np.empty(len(self.quads))
-        total = energy_of_quads(
-            self.nodes, self.quads, self.share, self.held, self.curve, self.arc, self.patches, self.curves, self.desired,
-            LENGTHS, ANGLES, out,
-        )  # fmt: skip
+        total = energy_of_quads(self.net, self.quads, self.share, LENGTHS, ANGLES, out)
         assert total == pytest.approx(out.sum())
         return float(total)
 
     def settle(self, sweeps: int) -> int:
         made = settle_quads(
-            self.nodes, self.quads, self.share, self.of, self.start, np.arange(len(self.nodes)), self.held, self.curve,
-            self.arc, self.patches, self.curves, self.desired, LENGTHS, ANGLES, sweeps, 1.5, 1e-12,
+            self.net, self.quads, self.share, self.of, self.start, np.arange(len(self.nodes)), LENGTHS, ANGLES, sweeps, 1.5, 1e-12
         )  # fmt: skip
         return int(made)
 
@@ -73,16 +83,9 @@ class Lattice:
         self, quad: int, corners: np.ndarray, allowed: float = np.inf, join: tuple[int, int] = (-1, -1)
     ) -> float:
         """Give a quad other corners, with all nodes around; return by how much the energy grows."""
-        at = np.full((len(self.nodes), 4), -1)
-        for v, (begin, end) in enumerate(pairwise(self.start.tolist())):
-            at[v, : end - begin] = self.of[begin:end]
-        net = QuadNet(
-            self.nodes, self.quads, at, self.degree, self.held, self.curve, self.arc, self.patches, self.curves,
-            self.desired, np.zeros(len(self.nodes) + len(self.quads), np.int64), np.zeros(1, np.int64),
-        )  # fmt: skip
         room = 4 * len(self.quads)
         growth, around = try_quads(
-            net, np.arange(len(self.nodes)), np.array([quad]), corners[None], self.at_boundary, LENGTHS, ANGLES, 1.5, 1e-12,
+            self.net, np.arange(len(self.nodes)), np.array([quad]), corners[None], self.at_boundary, LENGTHS, ANGLES, 1.5, 1e-12,
             *join, allowed, np.empty(room, np.int64), np.empty((room, 4)),
         )  # fmt: skip
         assert around == len(self.nodes)
@@ -98,8 +101,8 @@ def slow_energy(lattice: Lattice) -> float:
             members.add(tuple(sorted((corners[k], corners[(k + 1) % 4]))))
             e, f = after - here, before - here
             c = e @ f / np.linalg.norm(e) / np.linalg.norm(f)
-            value = c**2 + FLAT * c**8
-            total += ANGLES * (value if np.cross(e, f)[2] > 0 else 2 * (1 + FLAT) - value)
+            value = c**2 + STRAIGHT_COST * c**8
+            total += ANGLES * (value if np.cross(e, f)[2] > 0 else 2 * (1 + STRAIGHT_COST) - value)
     lengths = np.array([np.linalg.norm(lattice.nodes[a] - lattice.nodes[b]) for a, b in members])
     return float(total + LENGTHS * ((lengths - 1) ** 2).sum())
 
@@ -114,12 +117,11 @@ def test_every_member_counts_once_and_every_corner_does(amount: float) -> None:
 @pytest.mark.parametrize("amount", [0.2, 1.5])
 def test_the_slope_at_a_node_is_that_of_the_whole_energy(amount: float) -> None:
     lattice, step = Lattice(7, amount), 1e-6
-    for v in np.flatnonzero(lattice.held == FREE).tolist():
+    for v in np.flatnonzero(lattice.held == FREE_NODE).tolist():
         place = lattice.nodes[v].copy()
         begin, end = int(lattice.start[v]), int(lattice.start[v + 1])
         found = node_energy(
-            lattice.nodes, lattice.quads, lattice.share, lattice.of, begin, end, v, tuple(place.tolist()), (0.0, 0.0, 1.0),
-            lattice.desired, LENGTHS, ANGLES,
+            lattice.net, lattice.quads, lattice.share, lattice.of[begin:end], v, tuple(place.tolist()), LENGTHS, ANGLES,
         )  # fmt: skip
         for axis in range(2):
             sides = []
@@ -135,19 +137,19 @@ def test_sides_and_corners_by_hand() -> None:
     assert side_energy((3.0, 0.0, 0.0), (0.0, 0.0, 0.0), 2.0) == pytest.approx((0.25, 0.5, 0.0, 0.0))
     east, north, up = (1.0, 0.0, 0.0), (0.0, 2.0, 0.0), (0.0, 0.0, 1.0)
     assert corner_energy(east, north, up)[0] == 0.0
-    assert corner_energy(north, east, up)[0] == 2 * (1 + FLAT)  # turned over
-    assert corner_energy(east, (0.0, 0.0, 0.0), up)[0] == 1 + FLAT  # no corner at all
-    assert corner_energy(east, (1.0, 1.0, 0.0), up)[0] == pytest.approx(0.5 + FLAT / 16)
+    assert corner_energy(north, east, up)[0] == 2 * (1 + STRAIGHT_COST)  # turned over
+    assert corner_energy(east, (0.0, 0.0, 0.0), up)[0] == 1 + STRAIGHT_COST  # no corner at all
+    assert corner_energy(east, (1.0, 1.0, 0.0), up)[0] == pytest.approx(0.5 + STRAIGHT_COST / 16)
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_nodes_settle_to_squares_and_what_rests_stays(seed: int) -> None:
     lattice = Lattice(seed, 0.25)
-    resting, before = lattice.nodes[lattice.held == AT_REST].tobytes(), lattice.energy()
+    resting, before = lattice.nodes[lattice.held == RESTING_NODE].tobytes(), lattice.energy()
     assert lattice.settle(200) < 200
     assert lattice.energy() < 1e-6 * before
     assert lattice.nodes == pytest.approx(lattice.squares, abs=1e-3)
-    assert lattice.nodes[lattice.held == AT_REST].tobytes() == resting
+    assert lattice.nodes[lattice.held == RESTING_NODE].tobytes() == resting
 
 
 def test_nodes_of_the_boundary_slide_along_it() -> None:
@@ -155,7 +157,7 @@ def test_nodes_of_the_boundary_slide_along_it() -> None:
     corners = np.array([0, SIZE, (SIZE + 1) ** 2 - 1, SIZE * (SIZE + 1)])
     arc = np.arange(4.0) * SIZE
     lattice.curves = Curves(lattice.squares[corners], arc, np.array([0, 4]), np.array([4.0 * SIZE]))
-    lattice.held[1:SIZE] = ALONG
+    lattice.held[1:SIZE] = SLIDING_NODE
     lattice.arc[1:SIZE] = np.arange(1, SIZE) + [0.2, -0.15, 0.25]
     lattice.nodes[1:SIZE, 0] = lattice.arc[1:SIZE]
     assert lattice.settle(200) < 200
@@ -169,6 +171,17 @@ def circle(points: int = 3600) -> tuple[Curves, np.ndarray]:
     turn = 2 * np.pi * np.arange(points) / points
     places = np.column_stack([np.cos(turn), np.sin(turn), 0 * turn])
     return curve_of(places), places
+
+
+def sliding(
+    nodes: np.ndarray, held: np.ndarray, curve: np.ndarray, arc: np.ndarray, curves: Curves, desired: float = 1.0
+) -> QuadNet:
+    """Nodes on curves, whose quads do not matter."""
+    count = len(nodes)
+    return QuadNet(
+        nodes, np.zeros((0, 4), np.int64), np.full((count, 4), -1), np.zeros(count, np.int64), held, curve, arc,
+        np.zeros(count, SURFACE_PATCH), curves, np.full(count, desired), np.zeros(count, np.int64), np.zeros(1, np.int64),
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize("degrees", [5, 40, 90])
@@ -185,10 +198,13 @@ def test_the_way_to_a_node_is_the_shorter_one_and_none_where_it_is_not_near_on_t
     total, step = float(curves.total[0]), 20
     nodes = places[[0, step, len(places) - step, step, step, len(places) // 2]]
     arc = curves.arc[[0, step, len(places) - step, 0, step, len(places) // 2]].copy()
-    held, curve = np.array([ALONG, ALONG, ALONG, AT_REST, ALONG, ALONG]), np.array([0, 0, 0, 0, 1, 0])
+    held, curve = (
+        np.array([SLIDING_NODE, SLIDING_NODE, SLIDING_NODE, RESTING_NODE, SLIDING_NODE, SLIDING_NODE]),
+        np.array([0, 0, 0, 0, 1, 0]),
+    )
 
     def way(u: int, target: float = 0.1) -> float:
-        return float(way_on_curve(nodes, held, curve, arc, curves, 0, 0.0, u, target))
+        return float(way_on_curve(sliding(nodes, held, curve, arc, curves), 0, 0.0, u, target))
 
     on = step * total / len(places)
     assert [way(1), way(2)] == pytest.approx([on, -on])
@@ -205,12 +221,12 @@ def test_a_node_that_slides_by_less_than_it_may_costs_no_more_for_its_sag() -> N
     at = np.array([0, 150, 0, len(places) - 150])
     nodes, arc = places[at].copy(), curves.arc[at].copy()
     nodes[2] = 0.0
-    held, curve = np.array([ALONG, ALONG, FREE, ALONG]), np.zeros(4, np.int64)
+    held, curve = np.array([SLIDING_NODE, SLIDING_NODE, FREE_NODE, SLIDING_NODE]), np.zeros(4, np.int64)
 
     def around(place: int) -> tuple[float, float]:
         found: tuple[float, float] = sag_around(
-            nodes, quads, share, np.zeros(1, np.int64), 0, 1, 0, tuple(places[place].tolist()), float(curves.arc[place]),
-            held, curve, arc, curves, np.full(4, 0.4),
+            sliding(nodes, held, curve, arc, curves, 0.4), quads, share, np.zeros(1, np.int64), 0,
+            tuple(places[place].tolist()), float(curves.arc[place]),
         )  # fmt: skip
         return found
 

@@ -10,7 +10,7 @@ from small_grids import dome
 
 import scantruss as st
 from scantruss.cells.collapse import LatticeMesh
-from scantruss.cells.last_settling import ASKEW, MORE_ASKEW, settle_last
+from scantruss.cells.last_settling import ASKEW_CORNER, MORE_ASKEW, settle_last
 from scantruss.cells.lead import Panels
 from scantruss.cells.pairing import pairs_of
 from scantruss.cells.quad_mesh import QuadMesh
@@ -90,7 +90,7 @@ def test_lengths_get_more_even_in_the_end_while_hardly_more_corners_get_askew(mo
                 work(mesh)
             corners, sides = mesh.live(), mesh.nodes[mesh.live()] - mesh.nodes[np.roll(mesh.live(), -1, axis=1)]
             lengths = np.linalg.norm(sides, axis=2)
-            askew = (np.abs(corner_angles_of(mesh.nodes, corners) - 90.0) > ASKEW).mean()
+            askew = (np.abs(corner_angles_of(mesh.nodes, corners) - 90.0) > ASKEW_CORNER).mean()
             seen.append((float(lengths.std() / lengths.mean()), float(askew)))
 
     monkeypatch.setattr("scantruss.cells.quads.settle_last", watched)

@@ -16,19 +16,20 @@ from typed import known
 from scantruss import Grid, PointCloud, Settings, grid_from_points
 from scantruss.check.certify import Judged, judge
 from scantruss.constraints.find import wanted_ridges
-from scantruss.constraints.fold_tracing import Tracer, is_even, parts_of
+from scantruss.constraints.fold_tracing import Tracer, is_even, parts_of_fold
 from scantruss.constraints.ridge_ends import Ridge, join_ends
 from scantruss.constraints.ridges import find_ridges
 from scantruss.errors import FrontError
-from scantruss.kernels.geometry.quadric import COLUMNS, WEIGHT
+from scantruss.kernels.geometry.quadric import FIT_POINT
 from scantruss.kernels.surface.ridges import (
-    FOUND,
+    FOLD,
     TERMS,
     fit_fold,
     fold_error,
     turned_frame,
 )
-from scantruss.kernels.surface.turned_folds import TABLE_COLUMNS, smooth_part, turned_fold_error
+from scantruss.kernels.surface.turned_folds import smooth_part, turned_fold_error
+from scantruss.runtime.jit import new_record
 from scantruss.surface.samples import sample_surface
 
 SIZE = 5.0  # member length of all shapes here
@@ -153,11 +154,11 @@ def test_a_grid_that_fails_with_its_ridges_is_made_without(monkeypatch: pytest.M
 def folds(count: int = 30, angle: float = 60.0, wiggle: float = 0.0, jitter: float = 0.0, gain: float = 1000.0) -> Any:
     """A row of folds a quarter member apart, as `Tracer` finds them."""
     rng = np.random.default_rng(5)
-    found = np.zeros((count, FOUND))
-    found[:, 0] = 0.25 * np.arange(count)
-    found[:, 1] = wiggle * rng.normal(size=count)
-    found[:, 6] = np.radians(angle + jitter * rng.normal(size=count))
-    found[:, 7] = gain
+    found = np.zeros(count, FOLD)
+    found["place"][:, 0] = 0.25 * np.arange(count)
+    found["place"][:, 1] = wiggle * rng.normal(size=count)
+    found["bend"] = np.radians(angle + jitter * rng.normal(size=count))
+    found["gain"] = gain
     return found
 
 
@@ -176,16 +177,16 @@ def test_what_is_short_blunt_or_uneven_is_no_ridge() -> None:
 def test_what_bends_evenly_is_even() -> None:
     ring = folds(60, angle=45.0)
     turn = 0.25 * np.arange(60)
-    ring[:, 0], ring[:, 1] = np.cos(turn), np.sin(turn)
+    ring["place"][:, 0], ring["place"][:, 1] = np.cos(turn), np.sin(turn)
     assert is_even(ring, np.radians(40.0))
 
 
 def test_lines_of_folds_are_parted_at_their_corners() -> None:
     line = folds(40)
-    line[20:, :2] = [4.75, 0.0] + 0.25 * np.arange(1, 21)[:, None] * [np.cos(0.9), np.sin(0.9)]
-    first, last = parts_of(line)
-    assert np.allclose(first[-1, :3], [4.75, 0.0, 0.0], atol=0.26) and len(first) + len(last) == 41
-    (whole,) = parts_of(folds(40))
+    line["place"][20:, :2] = [4.75, 0.0] + 0.25 * np.arange(1, 21)[:, None] * [np.cos(0.9), np.sin(0.9)]
+    first, last = parts_of_fold(line)
+    assert np.allclose(first["place"][-1], [4.75, 0.0, 0.0], atol=0.26) and len(first) + len(last) == 41
+    (whole,) = parts_of_fold(folds(40))
     assert len(whole) == 40
 
 
@@ -282,19 +283,19 @@ def test_a_hip_roof_has_all_of_its_ridges() -> None:
 def test_the_error_of_a_fold_is_that_of_least_squares(seed: int, folded: bool) -> None:
     rounding = 0.1 * (seed % 4)
     rng = np.random.default_rng(seed)
-    buffer = np.zeros((60, COLUMNS))
-    buffer[:, :3] = rng.uniform(-1, 1, (60, 3)) * [0.8, 0.8, 0.3]
-    buffer[:, WEIGHT] = rng.uniform(0.1, 1, 60)
+    buffer = np.zeros(60, FIT_POINT)
+    buffer["place"] = rng.uniform(-1, 1, (60, 3)) * [0.8, 0.8, 0.3]
+    buffer["weight"] = rng.uniform(0.1, 1, 60)
     shift = rng.uniform(-0.3, 0.3)
     frame = turned_frame((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), rng.uniform(-0.3, 0.3))
     c, e, n = map(np.array, frame)
     matrix = np.empty((TERMS, TERMS + 1))
     error = fold_error(buffer, 60, frame, shift, 1.0, folded, rounding, matrix)
-    u, t, h = buffer[:, :3] @ c - shift, buffer[:, :3] @ e, buffer[:, :3] @ n
+    u, t, h = buffer["place"] @ c - shift, buffer["place"] @ e, buffer["place"] @ n
     size = np.hypot(u, rounding)
     last = [size, u * size] if folded else [u**3]
     terms = np.stack([np.ones(60), t, t * t, u, u * u, u * t, *last], axis=1)
-    root = np.sqrt(buffer[:, WEIGHT])
+    root = np.sqrt(buffer["weight"])
     solution, squares, *_ = np.linalg.lstsq(root[:, None] * terms, root * h, rcond=None)
     assert error == pytest.approx(float(squares[0]), rel=1e-4)
     assert np.allclose(matrix[: terms.shape[1], TERMS], solution, rtol=1e-3, atol=1e-3)
@@ -304,17 +305,16 @@ def test_the_error_of_a_fold_is_that_of_least_squares(seed: int, folded: bool) -
 @given(st.integers(0, 10_000))
 def test_the_error_of_a_turned_fold_is_the_same_once_the_quadrics_are_taken_out(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    buffer = np.zeros((60, COLUMNS))
-    buffer[:, :3] = rng.uniform(-1, 1, (60, 3)) * [0.8, 0.8, 0.3]
-    buffer[:, WEIGHT] = rng.uniform(0.1, 1, 60)
+    buffer = np.zeros(60, FIT_POINT)
+    buffer["place"] = rng.uniform(-1, 1, (60, 3)) * [0.8, 0.8, 0.3]
+    buffer["weight"] = rng.uniform(0.1, 1, 60)
     across, normal, radius = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0), rng.uniform(0.7, 1.0)
-    table = np.empty((60, TABLE_COLUMNS))
-    squares = smooth_part(buffer, turned_frame(across, normal, 0.0), radius, table)
+    freed, squares = smooth_part(buffer, 60, turned_frame(across, normal, 0.0), radius)
     matrix = np.empty((TERMS, TERMS + 1))
     for rounding in (0.0, 0.1, 0.3):
         angle, shift = rng.uniform(-1.5, 1.5), rng.uniform(-0.4, 0.4)
         whole = fold_error(buffer, 60, turned_frame(across, normal, angle), shift, radius, True, rounding, matrix)
-        assert turned_fold_error(table, squares, angle, shift, rounding) == pytest.approx(whole, rel=1e-4)
+        assert turned_fold_error(freed, squares, angle, shift, rounding) == pytest.approx(whole, rel=1e-4)
 
 
 @pytest.mark.kernels
@@ -328,14 +328,14 @@ def test_a_fold_is_measured_where_it_is() -> None:
         settings = Settings(length=1.0)
         cloud = PointCloud.from_array(points)
         tracer = Tracer(sample_surface(cloud, settings), settings)
-        found = np.zeros(FOUND)
+        found = new_record(FOLD)
         for x in (-0.2, 0.0, 0.25):
             place = np.array([x, 0.3, -slope * abs(x)]) - cloud.origin
             sample = int(((tracer.surface.mean - place) ** 2).sum(axis=1).argmin())
             assert fit_fold(tracer.surface, sample, tuple(place), (0.0, 0.0, 0.0), 0.8, tracer.buffer, found)
-            assert np.abs(found[[0, 2]] + cloud.origin[[0, 2]]).max() < 0.02
-            assert abs(found[4]) > 0.999 and np.degrees(found[6]) == pytest.approx(degrees, abs=5.0)
-            assert found[7] > 1000 and found[8] < 0.02
+            assert np.abs((found.place + cloud.origin)[[0, 2]]).max() < 0.02
+            assert abs(found.ahead[1]) > 0.999 and np.degrees(found.bend) == pytest.approx(degrees, abs=5.0)
+            assert found.gain > 1000 and found.off < 0.02
 
 
 def test_ridges_are_found_once_for_the_same_samples_and_settings() -> None:

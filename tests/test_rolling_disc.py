@@ -16,7 +16,7 @@ from scantruss.kernels.surface.local_surface import Surface
 
 @pytest.mark.kernels
 @given(st.lists(st.tuples(st.floats(-180, 180), st.floats(0.2, 1.0)), max_size=9), st.floats(20, 85))
-def test_a_site_has_a_gap_where_no_neighbour_lies_for_more_than_an_angle(
+def test_a_sample_has_a_gap_where_no_neighbour_lies_for_more_than_an_angle(
     others: list[tuple[float, float]], widest: float
 ) -> None:
     angles = np.radians([angle for angle, _ in others])
@@ -53,7 +53,7 @@ def widest_free(surface: Surface, sample: int, radius: float) -> tuple[Any, floa
 @pytest.mark.kernels
 @settings(max_examples=15)
 @given(st.integers(0, 10**6), st.floats(0.15, 0.4))
-def test_a_site_is_at_the_edge_where_a_disc_that_touches_it_can_be_empty(seed: int, radius: float) -> None:
+def test_a_sample_is_at_the_edge_where_a_disc_that_touches_it_can_be_empty(seed: int, radius: float) -> None:
     """Points at random leave gaps between their neighbours at many samples, into most of which no disc fits."""
     rng = np.random.default_rng(seed)
     surface = samples_of(np.pad(rng.uniform(0, 2, (250, 2)), ((0, 0), (0, 1))), length=0.3).surface

@@ -16,7 +16,7 @@ from scantruss import InputError, PointCloud, Settings, grid_from_points
 from scantruss.kernels.geometry.boxes import new_boxes
 from scantruss.kernels.surface.local_surface import Surface
 from scantruss.kernels.surface.normals import (
-    cut_steep_links,
+    cut_steep_links_of,
     link_weights,
     orient_normals,
     sample_normals,
@@ -89,7 +89,7 @@ def clouds(draw: st.DrawFn) -> np.ndarray:
 
 @pytest.mark.kernels
 @given(clouds(), st.floats(0.02, 0.8))
-def test_every_point_has_a_site_within_the_radius_and_sites_keep_it(points: np.ndarray, radius: float) -> None:
+def test_every_point_has_a_sample_within_the_radius_and_samples_keep_it(points: np.ndarray, radius: float) -> None:
     owner, chosen = thinned(points, radius)
     assert chosen.tolist() == naive.thin(points, radius)
     assert (np.linalg.norm(points - points[chosen[owner]], axis=1) < radius).all()
@@ -100,7 +100,7 @@ def test_every_point_has_a_site_within_the_radius_and_sites_keep_it(points: np.n
 
 @pytest.mark.kernels
 @given(clouds(), st.floats(0.02, 0.8))
-def test_points_belong_to_the_nearest_site_that_the_links_lead_to(points: np.ndarray, radius: float) -> None:
+def test_points_belong_to_the_nearest_sample_that_the_links_lead_to(points: np.ndarray, radius: float) -> None:
     """With links to all the others that is the nearest of all, the first of several that are as near but for rounding."""
     owner, chosen = thinned(points, radius)
     places, all_others = points[chosen], np.arange(len(chosen))
@@ -112,7 +112,7 @@ def test_points_belong_to_the_nearest_site_that_the_links_lead_to(points: np.nda
 
 @pytest.mark.kernels
 @given(clouds(), st.floats(0.02, 0.8), st.integers(0, 50))
-def test_sites_move_with_the_cloud(points: np.ndarray, radius: float, seed: int) -> None:
+def test_samples_move_with_the_cloud(points: np.ndarray, radius: float, seed: int) -> None:
     """A turn and a shift of the cloud change nothing, unless rounding decides which of two distances is the larger."""
     distance = np.linalg.norm(points[:, None] - points[None], axis=2)
     for row in distance:
@@ -135,7 +135,7 @@ def test_room_that_runs_out_on_the_way_makes_no_difference(points: np.ndarray, r
 
 @pytest.mark.kernels
 @given(clouds(), st.integers(0, 99))
-def test_points_are_grouped_by_site_with_their_means(points: np.ndarray, seed: int) -> None:
+def test_points_are_grouped_by_sample_with_their_means(points: np.ndarray, seed: int) -> None:
     owner = np.random.default_rng(seed).permutation(np.arange(len(points)) % 7)
     samples = int(owner.max()) + 1
     start, mean = np.zeros(samples + 1, np.int64), np.zeros((samples, 3))
@@ -149,7 +149,7 @@ def test_points_are_grouped_by_site_with_their_means(points: np.ndarray, seed: i
 
 @pytest.mark.kernels
 @given(st.integers(0, 1000), st.integers(8, 60), st.floats(0.3, 3.0))
-def test_nearest_sites_are_the_nearest(seed: int, count: int, far: float) -> None:
+def test_nearest_samples_are_the_nearest(seed: int, count: int, far: float) -> None:
     places = np.random.default_rng(seed).random((count, 3)) * [2.0, 2.0, 0.2]
     boxes = new_boxes(places.min(axis=0), places.max(axis=0), 0.2, count, count)
     put_all(boxes, places, np.arange(count))
@@ -268,7 +268,7 @@ def test_links_to_another_sheet_are_cut_and_links_around_a_ridge_stay() -> None:
     mean = np.array([(0, 0, 0), (0, 0, 1), (1, 0, 0), (0.1, 0, -1)], float)
     normals = np.array([up, up, up, side])
     neighbors = np.array([[1, 2, 3], [0, -1, -1], [0, -1, -1], [0, -1, -1]])
-    cut_steep_links(mean, normals, neighbors, 0.75, 0, len(mean))
+    cut_steep_links_of(mean, normals, neighbors, 0.75, 0, len(mean))
     assert neighbors.tolist() == [[2, 3, -1], [-1, -1, -1], [0, -1, -1], [0, -1, -1]]
 
 
@@ -321,7 +321,7 @@ def test_a_rough_cloud_is_seen_as_a_sheet(noise: float) -> None:
     assert np.degrees(np.arccos(abs(surface.normals[inside, 2]))).mean() < 4
 
 
-def test_a_few_thick_sites_along_ridges_do_not_make_a_scan_rough() -> None:
+def test_a_few_thick_samples_along_ridges_do_not_make_a_scan_rough() -> None:
     """They stay where they are: moved to the plane around them they would leave the ridges, and others would be chosen."""
     shape = make("great_court", 100_000)
     length = (2 * shape.area / (3**0.5 * 1000)) ** 0.5
@@ -340,7 +340,7 @@ def test_the_area_is_about_right() -> None:
 
 
 @pytest.mark.kernels
-def test_sites_are_kept_as_long_as_their_cloud_and_the_length_stay() -> None:
+def test_samples_are_kept_as_long_as_their_cloud_and_the_length_stay() -> None:
     cloud = PointCloud.from_array(sheet(4, 3, 0.25))
     first = sample_surface(cloud, Settings(length=1.0))
     assert sample_surface(cloud, Settings(length=1.0, method="paper")) is first
@@ -355,7 +355,7 @@ def test_same_cloud_same_bytes() -> None:
         assert np.asarray(x).tobytes() == np.asarray(y).tobytes()
 
 
-def test_repeated_points_change_no_site() -> None:
+def test_repeated_points_change_no_sample() -> None:
     points = sheet(8, 6, 0.2)
     a = samples_of(points).surface
     b = samples_of(np.concatenate([points, points[::3]])).surface
@@ -363,7 +363,7 @@ def test_repeated_points_change_no_site() -> None:
     assert a.neighbors.tolist() == b.neighbors.tolist() or abs(a.mean - b.mean).max() < 0.1
 
 
-def test_points_are_sorted_where_their_sites_are_many(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_points_are_sorted_where_their_samples_are_many(monkeypatch: pytest.MonkeyPatch) -> None:
     """The same points, each near those before it; points of few samples stay as they are."""
     monkeypatch.setattr(module, "SAMPLES_TO_SORT", 1_000)
     points = sheet(20.0, 20.0, 0.3)

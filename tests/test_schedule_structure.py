@@ -14,7 +14,7 @@ import scantruss as st
 from scantruss.cli.main import main
 from scantruss.schedules.bolts import PITCHES, bolted_radii, choose_bolts, stress_area, tension_resistance
 from scantruss.schedules.forces import grid_of_structure
-from scantruss.schedules.lines import warning_lines
+from scantruss.schedules.lines import schedule_warnings
 from scantruss.structure.json import read_checked
 from scantruss.structure.truss import LoadCase
 
@@ -157,7 +157,7 @@ def test_what_a_structure_lacks_is_warned_of_with_its_place() -> None:
         row[5] is not None for row in found["slender member"]
     )
     assert len(found["bolts are chosen for tension and carry no moments"]) == 1
-    (bolts,) = (line for line in warning_lines(made.warnings) if "no moments" in line)
+    (bolts,) = (line for line in schedule_warnings(made.warnings) if "no moments" in line)
     assert re.fullmatch(r"warning: bolts are chosen .* no moments; the greatest is [\d.]+ kNm at M\d+", bolts)
     strong = tension_resistance(64, "4.6") / 1e3
     assert len(found.get("no bolt carries the tension", [])) == (numbers(made.members, "force max") > strong).sum()
@@ -167,11 +167,11 @@ def test_balls_heavier_than_the_structure_allows_for_are_told_with_what_allows_f
     truss = roof()
     made = st.schedule(truss, st.ScheduleSettings())
     share = math.fsum(numbers(made.nodes, "mass")) / truss.mass
-    (said,) = (line for line in warning_lines(made.warnings) if "balls weigh" in line)
+    (said,) = (line for line in schedule_warnings(made.warnings) if "balls weigh" in line)
     assert f"weigh {100 * share:.0f} % of the members" in said and f"--node-allowance {share:.2f} takes" in said
     allowed = roof(node_allowance=share)
     assert not any(
-        "balls weigh" in line for line in warning_lines(st.schedule(allowed, st.ScheduleSettings()).warnings)
+        "balls weigh" in line for line in schedule_warnings(st.schedule(allowed, st.ScheduleSettings()).warnings)
     )
 
 
@@ -179,7 +179,7 @@ def test_no_allowance_for_balls_is_advised_that_a_structure_refuses() -> None:
     heavy = roof(section="CHS21.3x2.6", scale=0.02)
     made = st.schedule(heavy, st.ScheduleSettings())
     assert math.fsum(numbers(made.nodes, "mass")) > 2 * heavy.mass
-    (said,) = (line for line in warning_lines(made.warnings) if "balls weigh" in line)
+    (said,) = (line for line in schedule_warnings(made.warnings) if "balls weigh" in line)
     assert "--node-allowance" not in said and "structure takes 200% at most" in said
 
 

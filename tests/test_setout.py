@@ -19,7 +19,7 @@ from scantruss.cli.main import main
 from scantruss.runtime.ours import kind_of_ours
 from scantruss.setout import assembly
 from scantruss.setout.assembly import MOST_MOVE, MOST_TIMES, assembly_steps
-from scantruss.setout.files import _page, encode_dxf, encode_pdf, scale_on, setout_paths
+from scantruss.setout.files import _page, encode_plan_dxf, encode_plan_pdf, scale_on, setout_paths
 from scantruss.setout.lines import cut_grid
 from scantruss.setout.sheets import LAYERS, _apart, make_sheets
 from scantruss.structure.frame import freedoms, stiffness_matrix
@@ -193,8 +193,8 @@ def test_supports_stand_where_the_scan_has_them_and_say_what_they_hold() -> None
 
 def test_the_dxf_is_clean_in_millimetres_on_named_layers_and_true_to_size() -> None:
     made = st.set_out(roof())
-    content = encode_dxf(make_sheets(made))
-    assert content == encode_dxf(make_sheets(made))
+    content = encode_plan_dxf(make_sheets(made))
+    assert content == encode_plan_dxf(make_sheets(made))
     document = ezdxf.read(io.StringIO(content.decode()))
     assert not document.audit().errors and document.header["$INSUNITS"] == 4
     found = list(document.modelspace())
@@ -214,8 +214,8 @@ def test_the_dxf_is_clean_in_millimetres_on_named_layers_and_true_to_size() -> N
 def test_pages_are_to_scale_and_nothing_lies_beside_them(paper: str) -> None:
     made = st.set_out(roof(), st.SetoutSettings(paper=paper, spacing=3000.0))
     sheets = make_sheets(made)
-    content = encode_pdf(sheets, paper)
-    assert content == encode_pdf(sheets, paper) and b"CreationDate" not in content
+    content = encode_plan_pdf(sheets, paper)
+    assert content == encode_plan_pdf(sheets, paper) and b"CreationDate" not in content
     boxes = re.findall(rb"/MediaBox \[ 0 0 ([\d.]+) ([\d.]+) \]", content)
     for sheet in sheets:
         scale, page = scale_on(sheet, paper)

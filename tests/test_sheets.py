@@ -61,7 +61,7 @@ def test_a_grid_of_one_sheet_does_not_cover_the_next() -> None:
     assert fault.kind == "cover" and fault.words.startswith("leaves out 50%") and fault.where is not None
 
 
-def test_thick_sites_give_up_thin_ones_that_stand_over_them() -> None:
+def test_thick_samples_give_up_thin_ones_that_stand_over_them() -> None:
     """Site 0 is linked to its own plate and to one sample of a plate above: that link goes, and its normal is upright again."""
     flat = np.stack(np.meshgrid(np.arange(4.0), np.arange(4.0)), axis=-1).reshape(-1, 2)
     low, high = np.column_stack([flat, np.zeros(16)]), np.column_stack([flat, np.full(16, 1.2)])

@@ -151,7 +151,7 @@ def test_a_blend_keeps_given_lengths_and_has_no_steps() -> None:
         assert check(lengths)
 
 
-def test_between_sites_a_length_is_that_of_the_sites_around() -> None:
+def test_between_samples_a_length_is_that_of_the_samples_around() -> None:
     lengths, surface = field_of(
         points := sheet(12.0, 6.0, 0.25), length_field=rows_of(points, across(points, 1.0, 2.0), 300)
     )

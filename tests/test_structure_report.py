@@ -15,9 +15,9 @@ import scantruss as st
 from scantruss.cli.main import main
 from scantruss.report.structural.contents import report_parts
 from scantruss.report.structural.parts import DataTable
-from scantruss.report.structural.pdf import WIDTH, _width, _wrapped
+from scantruss.report.structural.pdf import TEXT_WIDTH, _width, _wrapped
 from scantruss.report.structural.source import ReportSource, greatest_stresses
-from scantruss.report.structural.words import fixed, load_words, support_words
+from scantruss.report.structural.words import fixed, load_words, supports_in_words
 from scantruss.runtime.ours import kind_of_ours
 from scantruss.structure.options import StructureSettings, read_structure_settings, settings_text
 from scantruss.structure.report import report_structure
@@ -160,8 +160,8 @@ def test_lines_of_a_pdf_fit_and_lose_nothing() -> None:
     rng = np.random.default_rng(0)
     for _ in range(20):
         words = " ".join("m" * int(n) for n in rng.integers(1, 90, 12))
-        lines = _wrapped(words, 9.0, WIDTH)
-        assert max(_width(line, 9.0) for line in lines) <= WIDTH
+        lines = _wrapped(words, 9.0, TEXT_WIDTH)
+        assert max(_width(line, 9.0) for line in lines) <= TEXT_WIDTH
         assert "".join(lines).replace(" ", "") == words.replace(" ", "")
 
 
@@ -232,8 +232,10 @@ def test_loads_and_supports_are_said_in_words() -> None:
     assert {load: load_words(load) for load in words} == words
     assert load_words({"case": "lamp", "force": [0, 0, "-2kN"]}) == "lamp"
     assert load_words({"case": "drift", "load": "snow:2kN/m2"}) == "drift (snow 2 kN/m2 on the area in plan)"
-    assert support_words("loop:1+lowest:0.6+N007") == "boundary loop 1 and nodes up to 0.6 m above the lowest and N007"
-    assert support_words("corners+line:rim") == "corners of the boundary and line rim"
+    assert (
+        supports_in_words("loop:1+lowest:0.6+N007") == "boundary loop 1 and nodes up to 0.6 m above the lowest and N007"
+    )
+    assert supports_in_words("corners+line:rim") == "corners of the boundary and line rim"
     assert [fixed(value, 1) for value in (-0.01, 0.0, -1234.56)] == ["0.0", "0.0", "-1,234.6"]
 
 

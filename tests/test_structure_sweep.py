@@ -9,7 +9,7 @@ from small_grids import dome
 
 import scantruss as st
 from scantruss.cli.main import main
-from scantruss.report.choosing import rows_of as table_rows
+from scantruss.report.choosing import rows_of_designs as table_rows
 from scantruss.structure.options import StructureSettings
 from scantruss.structure.variants import VariantFigures, Variants, lightest, solve_variants
 from scantruss.sweep import FIGURES, Outcome, Trial
@@ -35,7 +35,7 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-def rows_of(path: str) -> list[dict[str, str]]:
+def rows_of_designs(path: str) -> list[dict[str, str]]:
     with Path(path).open() as file:
         return list(csv.DictReader(file))
 
@@ -45,7 +45,7 @@ def test_every_length_support_and_rise_is_a_row_and_the_lightest_is_named(
 ) -> None:
     words = f"{RUN} --length 3,4 --supports corners,boundary,line:none --rise 0.7,1"
     assert main(words.split()) == 0
-    said, rows = capsys.readouterr().out, rows_of("out/structures.csv")
+    said, rows = capsys.readouterr().out, rows_of_designs("out/structures.csv")
     assert [(row["length"], row["supports"], row["rise"]) for row in rows] == [
         (length, where, rise) for length in ("3", "4") for where in ("corners", "boundary", "line:none") for rise in ("0.7", "1")
     ]  # fmt: skip
@@ -71,7 +71,7 @@ def test_a_grid_that_passed_with_warnings_is_said_to() -> None:
 
 def test_a_row_is_what_the_command_structure_finds(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(f"{RUN} --length 4 --rise 1".split()) == 0
-    (row,) = rows_of("out/structures.csv")
+    (row,) = rows_of_designs("out/structures.csv")
     assert main("structure out/grid.json a.json --settings roof.toml --buckling 1".split()) == 0
     assert f"{st.read_structure('a.json').mass:.0f}" == row["mass [kg]"]
     said = capsys.readouterr().out.partition("buckling factors of ULS 1.35 self + 1.5 snow: ")[2].split()[0]

@@ -15,7 +15,7 @@ from scantruss.studio.drawn_lines import ScannedPoints, numbers_of, points_of
 from scantruss.studio.frame import DRAWN_EXTENT, SceneFrame
 from scantruss.studio.length_brush import MOST_PAINTED, painted, places_to_paint
 from scantruss.studio.session import Session
-from scantruss.studio.symmetry_tool import corners_of, ends_on, upright_plane
+from scantruss.studio.symmetry_tool import corners_of_plane, ends_on, upright_plane
 from scantruss.surface.samples import sample_surface
 
 HEIGHT = 6.0
@@ -125,7 +125,7 @@ def test_an_arrow_that_is_none_is_refused(given: dict[str, object], words: str) 
 
 def test_a_mirror_plane_is_drawn_where_it_is(dome: st.PointCloud) -> None:
     frame, normal = SceneFrame.of(dome), np.array([1.0, 2.0, 0.0]) / np.sqrt(5)
-    corners = corners_of(frame, np.array([4.5e5, 5.3e6, 2.0, 1.0, 2.0, 0.0]))
+    corners = corners_of_plane(frame, np.array([4.5e5, 5.3e6, 2.0, 1.0, 2.0, 0.0]))
     places = frame.from_scene(corners) - [4.5e5, 5.3e6, 2.0]
     assert np.abs(places @ normal).max() < 1e-5 and np.ptp(corners, axis=0).max() < 1.3 * DRAWN_EXTENT
 

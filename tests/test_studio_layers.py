@@ -12,7 +12,7 @@ import scantruss as st
 from scantruss.cli.main import main
 from scantruss.export.page_tables import tables_of
 from scantruss.grid.marks import node_marks
-from scantruss.layouts.double_layer import BOTTOM, TOP, WEB
+from scantruss.layouts.double_layer import BOTTOM_MEMBERS, TOP_MEMBERS, WEB_MEMBERS
 from scantruss.layouts.framework import Framework
 from scantruss.structure.options import StructureSettings
 from scantruss.studio.compare import drawn_design, structure_figures
@@ -40,10 +40,10 @@ def test_a_double_layer_is_that_of_the_command_line_and_kept(tmp_path: Path, mon
     session = layered(tmp_path)
     assert session.solution is not None and session.grid is not None
     truss = session.solution.truss
-    assert set(truss.member_sets) == {TOP, BOTTOM, WEB} and truss.pinned
+    assert set(truss.member_sets) == {TOP_MEMBERS, BOTTOM_MEMBERS, WEB_MEMBERS} and truss.pinned
     figures = dict(structure_figures(session.state))
-    assert [figures[name].split()[0] for name in (TOP, BOTTOM, WEB)] == [
-        str(len(truss.member_sets[name])) for name in (TOP, BOTTOM, WEB)
+    assert [figures[name].split()[0] for name in (TOP_MEMBERS, BOTTOM_MEMBERS, WEB_MEMBERS)] == [
+        str(len(truss.member_sets[name])) for name in (TOP_MEMBERS, BOTTOM_MEMBERS, WEB_MEMBERS)
     ]
     monkeypatch.chdir(tmp_path)
     ours = session.files("structure", ".json")["structure.json"]
@@ -71,7 +71,7 @@ def test_a_double_layer_is_that_of_the_command_line_and_kept(tmp_path: Path, mon
     done(session)
     single = session.state.solution
     assert single is not None and len(single.truss.members) == len(session.grid.edges)
-    assert not {TOP, BOTTOM, WEB} & dict(structure_figures(session.state)).keys()
+    assert not {TOP_MEMBERS, BOTTOM_MEMBERS, WEB_MEMBERS} & dict(structure_figures(session.state)).keys()
 
 
 def test_all_layers_are_printed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -119,7 +119,7 @@ def test_what_lies_below_the_panels_is_found_by_a_click(tmp_path: Path) -> None:
     )
     assert model.truss is not None and session.grid is not None
     found = set()
-    for member in model.truss.member_sets[BOTTOM].tolist():
+    for member in model.truss.member_sets[BOTTOM_MEMBERS].tolist():
         begin, end = model.nodes[model.members[member]]
         place = begin + 0.3 * (end - begin)  # away from the members of the grid, which cross its middle
         found.add(StudioView.under(view, place + [0.0, 0.0, 30.0], np.array([0.0, 0.0, -1.0])) == ("members", member))

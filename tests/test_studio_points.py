@@ -27,7 +27,7 @@ from scantruss.studio.colours import (
     rgb_of,
 )
 from scantruss.studio.frame import distance_to_see
-from scantruss.studio.outputs import TAKEN, command_of, settings_files
+from scantruss.studio.outputs import TAKEN, command_of_project, settings_files
 from scantruss.studio.pictures import about_z, angle_to_see, facing, over
 from scantruss.studio.project import save_project
 from scantruss.studio.remove_tool import seen_within
@@ -128,7 +128,7 @@ def test_points_removed_by_hand_stay_away_and_come_back(tmp_path: Path) -> None:
     assert np.array_equal(again.cloud.points, session.cloud.points) and np.array_equal(again.state.taken(), kept)
     assert np.array_equal(colors_of_scan(again.state, np.arange(kept.sum()), OWN_COLORS)[0], COLORS[kept])
     (tmp_path / TAKEN).write_bytes(settings_files(session.state)[TAKEN])
-    assert f"grid {TAKEN}" in command_of(session.state)  # no option removes them: the points go along
+    assert f"grid {TAKEN}" in command_of_project(session.state)  # no option removes them: the points go along
     read = read_points(tmp_path / TAKEN)
     assert np.array_equal(read.points, session.cloud.points) and np.array_equal(read.origin, session.cloud.origin)
     session.undo()
@@ -261,7 +261,7 @@ def test_a_crop_keeps_the_cleaning_and_the_command_line_does_the_same(
     again = Session()
     again.open(tmp_path / "a.scantruss")
     assert again.state.cleaning is not None and again.state.cleaning.crop == ()
-    clean = command_of(session.state).splitlines()[0]
+    clean = command_of_project(session.state).splitlines()[0]
     assert "--crop" not in clean and box not in clean
     settings = json.loads(settings_files(session.state)["settings.json"])
     monkeypatch.chdir(tmp_path)

@@ -19,7 +19,7 @@ from studio_person import field, served_dome, served_session, tab, until
 
 from scantruss.grid.grid import Grid
 from scantruss.layouts.on_scan import ScanOfGrid
-from scantruss.layouts.trade import COUNTS, traded_lengths
+from scantruss.layouts.trade import COUNTS_TRIED, traded_lengths
 from scantruss.runtime.progress import Progress
 from scantruss.studio import server, trade_steps
 from scantruss.studio.head import words_of_session
@@ -202,7 +202,7 @@ def test_a_number_of_the_curve_counts_while_the_trade_goes_on(tmp_path: Path, mo
     goes_on, found = Event(), traded_lengths
 
     def in_steps(before: Any, tolerance: float, counts: Any, *others: Any) -> Any:
-        if counts[0] == COUNTS[2]:
+        if counts[0] == COUNTS_TRIED[2]:
             goes_on.wait(PATIENCE)
         return found(before, tolerance, counts, *others)
 
@@ -213,7 +213,7 @@ def test_a_number_of_the_curve_counts_while_the_trade_goes_on(tmp_path: Path, mo
         page.click("text=Few different parts")
         field(page, "tolerance").fill("20%")
         page.click("button:has-text('Find what fewer cost')")
-        number = COUNTS[1]
+        number = COUNTS_TRIED[1]
         page.wait_for_selector(f"svg [data-low='{number}'] rect", state="attached")
         page.click(f"svg [data-low='{number}'] rect")
         goes_on.set()  # another number of lengths comes while the number on the curve is being taken

@@ -15,7 +15,7 @@ from scantruss.scan.formats.reading import read_points
 from scantruss.selection import Selection, polygon_text
 from scantruss.studio.crop_tool import check_rings, crosses_itself
 from scantruss.studio.frame import SceneFrame
-from scantruss.studio.outputs import TAKEN, command_of, settings_files
+from scantruss.studio.outputs import TAKEN, command_of_project, settings_files
 from scantruss.studio.scan_parts import UP_AXES
 from scantruss.studio.session import Session
 from scantruss.studio.state import StudioState
@@ -107,7 +107,7 @@ def test_what_is_red_goes_and_the_command_line_does_the_same(
     again = Session()
     again.open(tmp_path / "roof.scantruss")
     assert again.cloud is not None and np.array_equal(again.cloud.points, cleaned.points)
-    clean, grid, _ = command_of(session.state).splitlines()
+    clean, grid, _ = command_of_project(session.state).splitlines()
     assert clean.startswith("scantruss clean roof.las clean.ply --crop box:450000") and "grid clean.ply" in grid
     monkeypatch.chdir(tmp_path)
     Path("roof.las").write_bytes(las.read_bytes())
@@ -158,7 +158,7 @@ def test_a_scan_is_turned_to_stand_on_any_axis_of_its_file_and_back(las: Path, t
         assert np.abs(after - before @ np.array(axes, float).T).max() < 1e-6
         assert np.linalg.det(np.array(axes, float)) == 1.0, "no mirror image"
     assert session.settings.fixed == () and session.state.tape == () and session.grid is None
-    assert command_of(session.state).startswith(f"scantruss grid {TAKEN} ")
+    assert command_of_project(session.state).startswith(f"scantruss grid {TAKEN} ")
     (tmp_path / TAKEN).write_bytes(settings_files(session.state)[TAKEN])
     read = read_points(tmp_path / TAKEN)
     assert np.abs(read.points + read.origin - (session.cloud.points + session.cloud.origin)).max() < 1e-6
@@ -167,7 +167,7 @@ def test_a_scan_is_turned_to_stand_on_any_axis_of_its_file_and_back(las: Path, t
     assert again.state.whole is not None and again.state.whole.up == "-x"
     session.turn("z")
     assert np.abs(session.cloud.points + session.cloud.origin - before).max() < 1e-6
-    assert TAKEN not in command_of(session.state)
+    assert TAKEN not in command_of_project(session.state)
 
 
 def test_the_camera_stays_where_points_go_and_sees_all_of_another_crop(las: Path, tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ import scantruss as st
 from scantruss.studio.browsers import MOST_BROWSERS, Browsers
 from scantruss.studio.certificate_list import merged
 from scantruss.studio.compare import comparison, deviation
-from scantruss.studio.features import HOLES, RIDGES, find_features, switched_off
+from scantruss.studio.features import HOLES, RIDGES, features_to_switch, switched_off
 from scantruss.studio.frame import SceneFrame, SectionPlane
 from scantruss.studio.outputs import project_file, settings_files
 from scantruss.studio.picking import nearest_member, nearest_panel, pick
@@ -62,7 +62,7 @@ def test_holes_and_ridges_are_switched_one_by_one_and_the_grid_follows(roof: Ses
     assert roof.cloud is not None
     for length in (0.9, 1.6):  # the places name the same hole and ridge at other lengths
         other = roof.settings.replace(length=length)
-        assert set(switched_off(find_features(roof.cloud, other), other)) == {0, 1}
+        assert set(switched_off(features_to_switch(roof.cloud, other), other)) == {0, 1}
     for _ in range(2):
         roof.undo()
     assert roof.grid is first and roof.settings.fill_at == () == roof.settings.no_ridge_at
@@ -229,10 +229,12 @@ def test_the_frame_and_back_is_nothing_and_a_section_cuts_at_its_plane() -> None
 
 
 def test_lines_are_seen_in_the_colours_of_the_legend() -> None:
-    from scantruss.studio.colours import DIMMED, DIVERGING, PLAIN, RISING, ramp
+    from scantruss.studio.colours import DIMMED_COLOUR, DIVERGING_COLOURS, PLAIN_COLOUR, RISING_COLOURS, ramp
 
     shares = np.linspace(0, 1, 60)
-    wanted = np.concatenate([ramp(shares, RISING), ramp(shares, DIVERGING), PLAIN[None], DIMMED[None]])
+    wanted = np.concatenate(
+        [ramp(shares, RISING_COLOURS), ramp(shares, DIVERGING_COLOURS), PLAIN_COLOUR[None], DIMMED_COLOUR[None]]
+    )
     assert np.abs(seen(to_be_seen(wanted)) - wanted).max() < 8
     measured = np.array([[139, 204, 201]])  # of a line in Chromium, drawn in (33, 145, 140)
     assert np.abs(seen(np.array([[33, 145, 140]])) - measured).max() < 1

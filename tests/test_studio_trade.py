@@ -11,8 +11,8 @@ from studio_dome import done, session_of_dome
 
 import scantruss as st
 from scantruss.cli.main import main
-from scantruss.layouts.trade import COUNTS
-from scantruss.studio.outputs import command_of, settings_files
+from scantruss.layouts.trade import COUNTS_TRIED
+from scantruss.studio.outputs import command_of_project, settings_files
 from scantruss.studio.session import Session
 from scantruss.studio.state import Trade
 from scantruss.studio.trade_tool import curve_of, words_of_present
@@ -37,7 +37,7 @@ def test_what_is_taken_of_the_trade_is_what_the_command_line_makes(
     trade = present(session)
     numbers = [each.number for each in trade.traded]
     assert numbers == sorted(set(numbers), reverse=True)
-    assert numbers == list(COUNTS) if parts == "lengths" else len(numbers) > 1
+    assert numbers == list(COUNTS_TRIED) if parts == "lengths" else len(numbers) > 1
     middle = trade.traded[len(numbers) // 2]
     session.take_traded(middle.number)
     done(session)
@@ -52,7 +52,7 @@ def test_what_is_taken_of_the_trade_is_what_the_command_line_makes(
     monkeypatch.chdir(tmp_path)
     for name, content in settings_files(session.state).items():
         Path(name).write_bytes(content)
-    commands = [line for line in command_of(session.state).splitlines() if not line.startswith("#")]
+    commands = [line for line in command_of_project(session.state).splitlines() if not line.startswith("#")]
     assert len(commands) == 2 and f"--parts {parts}" in commands[1]
     for line in commands:
         assert main(line.split()[1:]) == 0
@@ -126,10 +126,10 @@ def test_a_trade_that_is_stopped_keeps_what_was_found(tmp_path: Path) -> None:
     session.find_trade("lengths", 0.02)
     done(session)
     end()
-    assert [each.number for each in present(session).traded] == list(COUNTS[:2])
+    assert [each.number for each in present(session).traded] == list(COUNTS_TRIED[:2])
     again = Session()
     again.open(tmp_path / "dome.scantruss")
-    assert [each.number for each in present(again).traded] == list(COUNTS[:2])
+    assert [each.number for each in present(again).traded] == list(COUNTS_TRIED[:2])
 
 
 def test_the_curve_has_a_place_to_click_for_each_number(tmp_path: Path) -> None:
@@ -138,7 +138,7 @@ def test_the_curve_has_a_place_to_click_for_each_number(tmp_path: Path) -> None:
     done(session)
     trade = present(session)
     svg = curve_of(trade, 7)
-    assert re.findall(r'data-field="at most" data-low="(\d+)"', svg) == [str(count) for count in sorted(COUNTS)]
+    assert re.findall(r'data-field="at most" data-low="(\d+)"', svg) == [str(count) for count in sorted(COUNTS_TRIED)]
     assert svg.count('stroke-width="2"') == 1  # the present one
-    assert svg.count("<circle") == 3 * len(COUNTS) and "nan" not in svg
+    assert svg.count("<circle") == 3 * len(COUNTS_TRIED) and "nan" not in svg
     assert json.loads(json.dumps(words_of_present(trade, session.state))).startswith("the grid as it was")

@@ -12,14 +12,14 @@ from scantruss.check import crossings
 from scantruss.constraints import fold_tracing
 from scantruss.front import advance
 from scantruss.runtime import watch
-from scantruss.runtime.watch import SPARE, Watch
+from scantruss.runtime.watch import SPARE_STEPS, Watch
 
 
 def test_a_stage_may_take_a_multiple_of_its_expected_steps() -> None:
     some = Watch("too many steps", 100.0, 3.0)
     for _ in range(3):
         some.note(100, (1.0, 2.0, 3.0))
-    some.note(SPARE, (1.0, 2.0, 3.0))
+    some.note(SPARE_STEPS, (1.0, 2.0, 3.0))
     with pytest.raises(st.FrontError, match="too many steps") as refusal:
         some.note(1, np.array([4.0, 5.0, 6.0]))
     assert refusal.value.where == (4.0, 5.0, 6.0)
@@ -35,7 +35,7 @@ def test_a_stage_may_take_a_multiple_of_its_expected_steps() -> None:
 )
 def test_each_stage_is_watched(monkeypatch: pytest.MonkeyPatch, module: object, multiple: str, words: str) -> None:
     """With a multiple that no stage can keep to, each one refuses, at a place on the scan."""
-    monkeypatch.setattr(watch, "SPARE", 0)
+    monkeypatch.setattr(watch, "SPARE_STEPS", 0)
     monkeypatch.setattr(module, multiple, 1e-3)
     shape = make("gable", 10_000)
     with pytest.raises(st.FrontError, match=words) as refusal:

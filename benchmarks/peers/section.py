@@ -1,4 +1,4 @@
-"""The section "Against everyone" of docs/numbers.md, every row in docs/peers.md, and the plots."""
+"""The section "Against everyone" of docs/numbers.md, the parameters in docs/peers.md, every run in docs/peers.csv, and the plots."""
 
 from __future__ import annotations
 
@@ -17,6 +17,11 @@ LIMIT = 300.0  #: of one run, with its imports and repetitions [s]
 QUICK_LIMIT, QUICK_REPEATS = 30.0, 1
 QUICK_CLOUDS = (Cloud("scallop", 100_000, 1_000, 0.3), Cloud("great_court", 100_000, 1_000, 0.0))
 QUICK_WAYS = tuple(way for way in WAYS if way.name != "ScanTruss best")
+INTRO = """\
+# Against everyone: parameters
+
+What each program was told, and its licence. Its results are in [numbers](numbers.md#against-everyone), where the columns are
+explained, and [every run, as CSV](peers.csv)."""
 NOTE = """\
 Each run is a separate process with a time limit, on points in memory. Only the work is timed, without imports and reading. A
 first call under 5 s is repeated three times (with --quick once) and the median counts, for every program. Ours is always
@@ -36,12 +41,8 @@ ships nor imports them. On Linux Open3D needs libusb-1.0 of the system; without 
 def section(rows: Sequence[Row], command: str, folder: Path = FILE.parent) -> Section:
     """Return the section of some rows; the complete tables and the plots are written beside the page."""
     names = draw(rows, folder)
-    whole = [f"### {group[0].cloud.title}\n\n{tables.full_table(group)}" for group in tables.by_cloud(rows)]
-    told = f"## Parameters of each program\n\n{tables.ways_table()}"
-    intro = "# Against everyone, cloud by cloud\n\nThe columns are explained in [numbers.md](numbers.md)."
-    (folder / "peers.md").write_text(
-        "\n\n".join([intro, told, "## Every run", *whole]) + "\n", encoding="utf-8", newline="\n"
-    )
+    (folder / "peers.csv").write_text(tables.every_run(rows), encoding="utf-8", newline="\n")
+    (folder / "peers.md").write_text(f"{INTRO}\n\n{tables.ways_table()}\n", encoding="utf-8", newline="\n")
     ordered = sorted(rows, key=lambda row: (row.cloud.points, row.cloud.nodes))
     parts = []
     for (points, nodes), group in groupby(ordered, key=lambda row: (row.cloud.points, row.cloud.nodes)):
@@ -59,7 +60,7 @@ def section(rows: Sequence[Row], command: str, folder: Path = FILE.parent) -> Se
             "Aims:\n\n" + "\n".join(met),
             NOTE,
             clouds,
-            "Every run, the parameters of each program, and licences: [peers.md](peers.md).",
+            "[Every run](peers.csv); [parameters and licences of each program](peers.md).",
             f"![seconds and CV of all grids]({names[0]})\n\n![boundary and CV of all grids]({names[1]})",
             *parts,
         )

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import csv
 import math
 import statistics
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from io import StringIO
 from itertools import groupby
 
 from .runs import Row
@@ -213,19 +215,18 @@ def topology(row: Row) -> str:
     f = row.found
     loose = "" if f["manifold"] else ", not manifold"
     pieces = "" if f["components"] == 1 else f", {f['components']} pieces"
-    return (
-        f"**wrong**: loops {f['loops']} not {f['true_loops']}, Euler {f['euler']} not {f['true_euler']}{loose}{pieces}"
-    )
+    return f"wrong: loops {f['loops']} not {f['true_loops']}, Euler {f['euler']} not {f['true_euler']}{loose}{pieces}"
 
 
-def full_table(group: Sequence[Row]) -> str:
-    """Return the table of one cloud."""
-    head = "| way | topology | " + " | ".join(words for _, words, _ in COLUMNS) + " |"
-    lines = [head, "| --- | --- |" + " ---: |" * len(COLUMNS)]
-    for row in group:
-        cells = " | ".join(_cell(row.value(name), show) for name, _, show in COLUMNS)
-        lines.append(f"| {row.way} | {topology(row).replace('|', '/')} | {cells} |")
-    return "\n".join(lines)
+def every_run(rows: Iterable[Row]) -> str:
+    """Return every row as CSV."""
+    kept = StringIO()
+    writer = csv.writer(kept, lineterminator="\n")
+    writer.writerow(["cloud", "points", "about nodes", "noise", "way", "topology", *(words for _, words, _ in COLUMNS)])
+    for row in rows:
+        cloud = row.cloud.shape, row.cloud.points, row.cloud.nodes, f"{row.cloud.noise:g}"
+        writer.writerow([*cloud, row.way, topology(row), *(_cell(row.value(name), show) for name, _, show in COLUMNS)])
+    return kept.getvalue()
 
 
 def summary(rows: Sequence[Row]) -> str:

@@ -70,6 +70,11 @@ class Boundary:
     loops: tuple[Loop, ...]
     bridged: tuple[np.ndarray, ...] = ()  #: (M, 3) closed curves around holes so small that the front runs over them
 
+    def __repr__(self) -> str:
+        """Say how long the loops are, and which are holes."""
+        loops = [f"{loop.length:.4g}{'' if loop.external else ' (hole)'}" for loop in self.loops]
+        return f"Boundary({len(loops)} loops{': ' + ', '.join(loops) if loops else ''})"
+
     @property
     def external(self) -> tuple[Loop, ...]:
         """The outer boundaries."""

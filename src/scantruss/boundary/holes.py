@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from ..kernels.mesh.point_location import nearest_sample
-from ..kernels.surface.local_surface import PATCH_COLUMNS, Surface, fit_patch, onto_patch, patch_normal, walk
+from ..kernels.surface.local_surface import SURFACE_PATCH, Surface, fit_patch, onto_patch, patch_normal, walk
 from ..runtime.blas import one_blas_thread
+from ..runtime.jit import new_record
 from ..surface.samples import SurfaceSamples
 
 FILLING_SPACING = 0.1  # distance between the points generated over a hole [member lengths]
@@ -71,7 +72,7 @@ def _look_around(
     away : (K,) distance from there [scan unit]
     places, normals : (K, 3) on the scanned surface
     """
-    length, patch = surface.length, np.zeros(PATCH_COLUMNS)
+    length, patch = surface.length, new_record(SURFACE_PATCH)
     found: list[tuple[int, float, np.ndarray, np.ndarray]] = []
     sample = nearest_sample(surface, *curve[0].tolist())
     for i in range(0, len(curve), max(1, len(curve) // PLACES_AROUND_HOLE)):

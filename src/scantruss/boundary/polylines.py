@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..kernels.mesh.point_location import nearest_sample
-from ..kernels.surface.local_surface import PATCH_COLUMNS, Surface, fit_patch, onto_patch, walk
+from ..kernels.surface.local_surface import SURFACE_PATCH, Surface, fit_patch, onto_patch, walk
+from ..runtime.jit import new_record
 
 if TYPE_CHECKING:
     from ..settings import Settings
@@ -80,7 +81,7 @@ def corners_of_polyline(points: np.ndarray, vertices: np.ndarray, closed: bool, 
 
 def feet_on_scan(points: np.ndarray, surface: Surface) -> tuple[np.ndarray, np.ndarray]:
     """Return the feet (M, 3) on the scan of the points of a polyline, and how far it leaves the scan there (M,) [scan unit]."""
-    patch, feet, gaps, sample = np.zeros(PATCH_COLUMNS), np.empty_like(points), np.empty(len(points)), -1
+    patch, feet, gaps, sample = new_record(SURFACE_PATCH), np.empty_like(points), np.empty(len(points)), -1
     for k, place in enumerate(points.tolist()):
         at = (place[0], place[1], place[2])
         sample = walk(surface, sample, at) if sample >= 0 else nearest_sample(surface, *at)

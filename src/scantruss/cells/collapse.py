@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..kernels.cells.collapse import collapse_edges
-from .fine_mesh import AT_REST_THERE, FineMesh
+from ..kernels.cells.quads import RESTING_NODE
+from .fine_mesh import FineMesh
 
 SAME_NODE = 0.5  # way in either axis up to which two lattice nodes are one [members]
 
@@ -23,7 +24,7 @@ class LatticeMesh:
     source: np.ndarray  #: (V,) int64 node of the fine mesh that each was
 
 
-def collapse(mesh: FineMesh, places: np.ndarray, ways: np.ndarray) -> LatticeMesh:
+def collapse_to_lattice(mesh: FineMesh, places: np.ndarray, ways: np.ndarray) -> LatticeMesh:
     """Return the fine mesh with all edges collapsed that join nodes of one lattice node.
 
     Parameters
@@ -45,7 +46,7 @@ def collapse(mesh: FineMesh, places: np.ndarray, ways: np.ndarray) -> LatticeMes
     counts = (mesh.held == held[inverse]).astype(float)  # a node of the boundary stays there
     mean: np.ndarray = np.stack([np.bincount(inverse, counts * places[:, k]) for k in range(3)], axis=1)
     mean = mean / np.bincount(inverse, counts)[:, None]
-    nodes = np.where((held == AT_REST_THERE)[:, None], mesh.nodes[kept], mean)
+    nodes = np.where((held == RESTING_NODE)[:, None], mesh.nodes[kept], mean)
     number = np.full(len(into), -1)
     number[kept] = np.arange(len(kept))
     pairs = ends.reshape(-1, 2)

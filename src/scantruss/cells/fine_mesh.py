@@ -9,10 +9,9 @@ import numpy as np
 from ..grid.grid import Grid
 from ..improve.working_mesh import WorkingMesh
 from ..kernels.boundary.curves import at_arc, nearest_on_curves
+from ..kernels.cells.quads import FREE_NODE, RESTING_NODE, SLIDING_NODE
 from ..kernels.mesh.grid import INTERIOR, ON_CURVE
 from ..kernels.surface.local_surface import onto_patch
-
-FREE, ALONG, AT_REST_THERE = 0, 1, 2  # what a node of a fine mesh may do: move on the scan, slide on a curve, stay
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,7 +20,7 @@ class FineMesh:
 
     nodes: np.ndarray  #: (F, 3) [scan unit]
     triangles: np.ndarray  #: (T, 3) int64
-    held: np.ndarray  #: (F,) int64 FREE, ALONG or AT_REST_THERE
+    held: np.ndarray  #: (F,) int64 FREE_NODE, SLIDING_NODE or RESTING_NODE
     chains: np.ndarray  #: (C, 2) int64 edges along the boundary and lines
     length: np.ndarray  #: (F,) desired member length [scan unit]
     owners: np.ndarray  #: (F, 3) int64 corners of the triangle of the grid that each node lies in
@@ -64,15 +63,15 @@ def fine_mesh(grid: Grid, mesh: WorkingMesh, parts: int) -> FineMesh:
     nodes = np.einsum("fc,fcx->fx", shares, grid.nodes[owners])
     own = owners[np.arange(len(owners)), shares.argmax(axis=1)]
 
-    held = np.full(len(nodes), FREE)
+    held = np.full(len(nodes), FREE_NODE)
     held[:count] = np.where(
-        net.kind[:count] == INTERIOR, FREE, np.where(net.kind[:count] == ON_CURVE, ALONG, AT_REST_THERE)
+        net.kind[:count] == INTERIOR, FREE_NODE, np.where(net.kind[:count] == ON_CURVE, SLIDING_NODE, RESTING_NODE)
     )
     chain = (grid.edge_uses == 1) | grid.edge_on_line
-    held[on_edge[chain].ravel()] = ALONG
+    held[on_edge[chain].ravel()] = SLIDING_NODE
     for v in range(count, len(nodes)):
         place = tuple(nodes[v].tolist())
-        if held[v] == FREE:
+        if held[v] == FREE_NODE:
             nodes[v] = onto_patch(mesh.patches[own[v]], place)
     if len(mesh.curves.total):
         _onto_curves(nodes, on_edge[chain].ravel(), mesh, grid)

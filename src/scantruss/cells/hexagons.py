@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..constraints.fixed_nodes import check_positions
+from ..constraints.fixed_nodes import check_fixed_positions
 from ..errors import FrontError
 from ..grid.grid import Grid
 from ..grid.panels import sides_of, sizes_of, table_of, triangles_of
@@ -82,7 +82,7 @@ def hexagons_of(
     report(0.0)
     if not (grid.topology.manifold and grid.topology.orientable):
         raise FrontError("the grid is no oriented manifold of triangles, which hexagons are made of", grid)
-    positions = check_positions(settings.fixed, samples, settings.length)
+    positions = check_fixed_positions(settings.fixed, samples, settings.length)
     images = Images.of_grid(grid)
     corners = np.concatenate([boundary.stops.reshape(-1, 3), constraints.lines.stops])
 
@@ -258,7 +258,7 @@ def even_out(mesh: WorkingMesh, grid: Grid, length: float) -> None:
     usual = np.where(seam, TRIANGLE_MEMBER, 1.0)
     panels = grid.panel_table
     before, after = _corners(panels)
-    normals = mesh.patches[:count, 3:6]
+    normals = mesh.patches["normal"][:count]
     at_boundary = np.zeros(count, np.bool_)
     seam_members = grid.edges[seam]
     at_boundary[seam_members.ravel()] = True

@@ -15,10 +15,11 @@ LAST_SWEEPS_OF_QUADS = 60  # most sweeps with each weight
 LAST_NEAR = 0.2  # distance of a node from the centre of its patch that gets it a new one [members]
 # weights of angles in the energy that are tried in turn after the usual one
 LOWER_ANGLES = (0.4, 0.36, 0.32, 0.285, 0.255, 0.225, 0.2, 0.18)
-ASKEW = 20.0  # angle by which a corner that is not near a right angle is off it [degree]
+ASKEW_CORNER = 20.0  # angle by which a corner that is not near a right angle is off it [degree]
 MORE_ASKEW = 1.2  # share of the corners askew before that may be so after where lengths are as even as is aimed at
 MOST_ASKEW = 0.049  # largest share of all corners that may be
-AIMS = (0.075, 0.05, 0.08)  # of the CV of lengths, the share of corners askew and that of irregular nodes inside
+# of the CV of lengths, the share of corners askew and that of irregular nodes inside
+AIMS_OF_QUADS = (0.075, 0.05, 0.08)
 
 
 def settle_last(mesh: QuadMesh) -> None:
@@ -32,7 +33,7 @@ def settle_last(mesh: QuadMesh) -> None:
     few = min(MORE_ASKEW * _askew(mesh, quads), most)
     last = QUAD_ANGLES
     for angles in LOWER_ANGLES:
-        uneven = _unevenness(mesh, quads) > AIMS[0]
+        uneven = _unevenness(mesh, quads) > AIMS_OF_QUADS[0]
         if not _lowered(mesh, quads, angles, most if uneven else few):
             if uneven:
                 _lowered(mesh, quads, math.sqrt(angles * last), most)
@@ -66,7 +67,7 @@ def shortfall(search: Search) -> float:
     inside = [v for v, own in enumerate(mesh.at) if own and not moves.at_boundary[v]]
     irregular = sum(moves.charge(v) > 0 for v in inside) / max(len(inside), 1)
     found = _unevenness(mesh, quads), _askew(mesh, quads) / quads.size, irregular
-    return max(value / aim for value, aim in zip(found, AIMS, strict=True))
+    return max(value / aim for value, aim in zip(found, AIMS_OF_QUADS, strict=True))
 
 
 def wide_corners(mesh: QuadMesh) -> int:
@@ -82,4 +83,4 @@ def _settle(mesh: QuadMesh, angles: float) -> None:
 
 def _askew(mesh: QuadMesh, quads: np.ndarray) -> int:
     """Return how many corners are not near a right angle."""
-    return int((np.abs(corner_angles_of(mesh.nodes, quads) - 90.0) > ASKEW).sum())
+    return int((np.abs(corner_angles_of(mesh.nodes, quads) - 90.0) > ASKEW_CORNER).sum())

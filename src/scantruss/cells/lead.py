@@ -6,8 +6,8 @@ import heapq
 
 import numpy as np
 
+from ..kernels.cells.quads import FREE_NODE, SLIDING_NODE
 from .collapse import LatticeMesh
-from .fine_mesh import ALONG, FREE
 from .pairing import squareness
 
 THROUGH_LINE = 6.0  # what a line in the way costs, which gets a node more, against a quad
@@ -42,7 +42,7 @@ class Panels:
         self.nodes.append([(x + y) / 2 for x, y in zip(self.nodes[a], self.nodes[b], strict=True)])
         key = (min(a, b), max(a, b))
         on_chain = key in self.chains
-        self.held.append(ALONG if on_chain else 0)
+        self.held.append(SLIDING_NODE if on_chain else FREE_NODE)
         if on_chain:
             self.chains.remove(key)
             self.chains |= {(min(a, middle), max(a, middle)), (min(b, middle), max(b, middle))}
@@ -88,7 +88,7 @@ class Panels:
             own = own[k:] + own[:k]  # a, b, tip
             tip = own[2]
             between = self._between(p, to) if to >= 0 else -1
-            if between >= 0 and self.held[between] == FREE:
+            if between >= 0 and self.held[between] == FREE_NODE:
                 self._drop(between, p, to)
                 self._lead(to)  # ends: panels are one fewer
                 return

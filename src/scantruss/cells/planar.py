@@ -24,20 +24,18 @@ from ..grid.panels import (
 )
 from ..improve.working_mesh import WorkingMesh
 from ..kernels.mesh.grid import AT_REST, INTERIOR, ON_CURVE
-from ..kernels.surface.local_surface import NORMAL, feet_on_patches
+from ..kernels.surface.local_surface import feet_on_patches
 from .factor import factored
 from .stops import slide_back, ways_along
 
 FARTHEST_OFF_SCAN = 0.1  # distance of a node from the scan up to which panels are made planar [members]
 PLANAR_ROUNDS = 60  # solutions
 FIRST_PULL, LAST_PULL = 0.3, 3000.0  # weight of the planes in the first and the last round, against lengths
-STAY = 0.02  # weight of where nodes were in the round before
-NEAR_SCAN, BACK_TO_SCAN = (
-    0.002,
-    30.0,
-)  # weight of the distance from the scan, and of what is beyond the share that is held
-HOLD = 0.93  # share of `FARTHEST_OFF_SCAN` at which a node is held
-BRACED = 0.2  # share of that weight for the ways across panels, which keep them from becoming hollow
+STAY_WEIGHT = 0.02  # weight of where nodes were in the round before
+# weight of the distance from the scan, and of what is beyond the share that is held
+NEAR_SCAN, BACK_TO_SCAN = 0.002, 30.0
+HELD_FROM = 0.93  # share of `FARTHEST_OFF_SCAN` at which a node is held
+BRACE_WEIGHT = 0.2  # share of that weight for the ways across panels, which keep them from becoming hollow
 LEAST_LEFT = 0.7  # share of its length that each member keeps
 SHORTEST_LEFT = 0.51  # length to which members may become shorter, more than the certificate asks for [desired lengths]
 WIDEST_IN_ROUND = 178.0  # angle within a panel up to which a round counts [degree]
@@ -68,7 +66,7 @@ def make_planar(mesh: WorkingMesh, grid: Grid, reach: float = 1.0) -> Grid:
     reach : float
         Share of the tenth of a member that nodes may be off the scan, above 0 to 1.
     """
-    most_off = reach * HOLD * FARTHEST_OFF_SCAN
+    most_off = reach * HELD_FROM * FARTHEST_OFF_SCAN
     net, count, panels = mesh.net, len(grid.nodes), grid.panel_table
     nodes, kind = net.nodes[:count], net.kind[:count]
     target = mesh.length * net.desired[:count]
@@ -91,7 +89,7 @@ def make_planar(mesh: WorkingMesh, grid: Grid, reach: float = 1.0) -> Grid:
         parts = [
             _weighed(*_planes(nodes, panels), np.sqrt(pull)),
             _lengths_kept(nodes, ends, lengths),
-            _weighed(*_lengths_kept(nodes, braces, spans), BRACED),
+            _weighed(*_lengths_kept(nodes, braces, spans), BRACE_WEIGHT),
             _near_scan(feet, kind, target, most_off),
             _held(kind, ways_along(nodes, rails), target),
         ]
@@ -136,7 +134,7 @@ def _feet(mesh: WorkingMesh, count: int) -> Feet:
     nodes, patches = mesh.net.nodes[:count], mesh.patches[:count]
     foot = np.empty((count, 3))
     feet_on_patches(patches, nodes, foot)
-    normal = patches[:, NORMAL : NORMAL + 3].copy()
+    normal = patches["normal"].copy()
     return Feet(normal, ((nodes - foot) * normal).sum(axis=1))
 
 
@@ -208,7 +206,7 @@ def _near_scan(feet: Feet, kind: np.ndarray, target: np.ndarray, most: float) ->
 
 def _held(kind: np.ndarray, along: np.ndarray, target: np.ndarray) -> tuple[csr_matrix, np.ndarray]:
     """Return what keeps all nodes from going far, those that slide on their curves and others where they are."""
-    weight = np.where(kind >= AT_REST, HELD_FAST, STAY)[:, None, None] * np.eye(3)
+    weight = np.where(kind >= AT_REST, HELD_FAST, STAY_WEIGHT)[:, None, None] * np.eye(3)
     slides = np.flatnonzero((kind == ON_CURVE) & (np.linalg.norm(along, axis=1) > 0.5))
     weight[slides] += HELD_FAST * (np.eye(3) - along[slides, :, None] * along[slides, None, :])
     at = np.repeat(np.arange(len(kind)), 3)[:, None]

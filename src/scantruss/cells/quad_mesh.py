@@ -9,11 +9,10 @@ import numpy as np
 from ..grid.grid import Grid
 from ..grid.panels import triangles_of
 from ..improve.working_mesh import WorkingMesh
-from ..kernels.cells.quads import energy_of_quads, settle_quads
-from ..kernels.cells.trial import QuadNet, try_quads
+from ..kernels.cells.quads import FREE_NODE, RESTING_NODE, SLIDING_NODE, QuadNet, energy_of_quads, settle_quads
+from ..kernels.cells.trial import try_quads
 from ..kernels.mesh.grid import INTERIOR, ON_CURVE
-from ..kernels.surface.local_surface import CENTRE, NEAREST_SAMPLE, fit_patch
-from .fine_mesh import ALONG, AT_REST_THERE, FREE
+from ..kernels.surface.local_surface import fit_patch
 
 QUAD_LENGTHS, QUAD_ANGLES = 3.0, 0.45  # weights of lengths and of angles in the energy
 QUAD_RELAXATION = 1.5  # over-relaxation
@@ -31,7 +30,9 @@ class QuadMesh:
         self.surface, self.curves, self.length = mesh.surface, mesh.curves, mesh.length
         self.nodes = _room(net.nodes[:count], room)
         kind = net.kind[:count]
-        self.held = _room(np.where(kind == INTERIOR, FREE, np.where(kind == ON_CURVE, ALONG, AT_REST_THERE)), room)
+        self.held = _room(
+            np.where(kind == INTERIOR, FREE_NODE, np.where(kind == ON_CURVE, SLIDING_NODE, RESTING_NODE)), room
+        )
         self.curve, self.arc = _room(net.curve[:count], room), _room(net.arc[:count], room)
         self.patches = _room(mesh.patches[:count], room)
         self.desired = _room(mesh.length * net.desired[:count], room)
@@ -74,7 +75,7 @@ class QuadMesh:
         """Move all nodes downhill."""
         quads = self.live()
         some = np.unique(quads)
-        self.settle_some(quads, some[self.held[some] != AT_REST_THERE], sweeps, lengths, angles, stride, enough)
+        self.settle_some(quads, some[self.held[some] != RESTING_NODE], sweeps, lengths, angles, stride, enough)
 
     def settle_some(
         self, quads: np.ndarray, some: np.ndarray, sweeps: int, lengths: float = QUAD_LENGTHS, angles: float = QUAD_ANGLES,
@@ -89,29 +90,15 @@ class QuadMesh:
         start = np.concatenate([[0], np.cumsum(end - begin)])
         of = order[np.isin(flat[order], some)] // 4
         settle_quads(
-            self.nodes, quads, share, of, start, some, self.held, self.curve, self.arc, self.patches, self.curves,
-            self.desired, lengths, angles, sweeps, stride, enough,
+            self.net, quads, share, of, start, some, lengths, angles, sweeps, stride, enough,
         )  # fmt: skip
-
-    def energies(
-        self,
-        quads: np.ndarray,
-        share: np.ndarray | None = None,
-        lengths: float = QUAD_LENGTHS,
-        angles: float = QUAD_ANGLES,
-    ) -> np.ndarray:
-        """Return the energy of each quad (Q,)."""
-        out = np.zeros(len(quads))
-        share = self.shares(quads) if share is None else share
-        energy_of_quads(
-            self.nodes, quads, share, self.held, self.curve, self.arc, self.patches, self.curves, self.desired,
-            lengths, angles, out,
-        )  # fmt: skip
-        return out
 
     def mean_energy(self) -> float:
         """Return the mean energy of a quad."""
-        return float(self.energies(self.live()).mean())
+        quads = self.live()
+        out = np.zeros(len(quads))
+        energy_of_quads(self.net, quads, self.shares(quads), QUAD_LENGTHS, QUAD_ANGLES, out)
+        return float(out.mean())
 
     def _enter(self, nodes: Iterable[int]) -> None:
         """Enter the quads at some nodes into the net."""
@@ -180,18 +167,16 @@ class QuadMesh:
     def add_node(self, beside: int, fresh: int, new: dict[int, list[int]]) -> None:
         """Put a new node near another, on the way to the others of its quads, which are among the corners that change."""
         self.patches[fresh], self.desired[fresh] = self.patches[beside], self.desired[beside]
-        self.held[fresh], self.fixed[fresh] = FREE, False
+        self.held[fresh], self.fixed[fresh] = FREE_NODE, False
         others = [w for ring in new.values() if fresh in ring for w in ring if w not in (fresh, beside)]
         self.nodes[fresh] = 0.6 * self.nodes[beside] + 0.4 * self.nodes[others].mean(axis=0)
 
     def renew(self, near: float) -> None:
         """Fit a new patch to each node farther from the centre of its own than `near` members."""
         used = np.unique(self.live())
-        away = np.linalg.norm(self.nodes[used] - self.patches[used, CENTRE : CENTRE + 3], axis=1)
+        away = np.linalg.norm(self.nodes[used] - self.patches["centre"][used], axis=1)
         for v in used[away > near * self.desired[used]].tolist():
-            fit_patch(
-                self.surface, self.patches[v], int(self.patches[v, NEAREST_SAMPLE]), tuple(self.nodes[v].tolist())
-            )
+            fit_patch(self.surface, self.patches[v], self.patches[v].sample, tuple(self.nodes[v].tolist()))
 
     def grid(self, like: Grid) -> Grid:
         """Return the quads as a grid with all else as in another; nodes without a quad are dropped."""

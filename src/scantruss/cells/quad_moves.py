@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..grid.panels import corner_angles_of
-from .fine_mesh import ALONG, AT_REST_THERE, FREE
+from ..kernels.cells.quads import FREE_NODE, RESTING_NODE, SLIDING_NODE
 from .quad_mesh import QuadMesh
 
 WORST_PENALTY = 2  # growth of the sum of squared irregularities up to which a move is tried
@@ -53,7 +53,7 @@ class Moves:
         mesh, quads = self.mesh, self.mesh.live()
         total = np.bincount(quads.ravel(), corner_angles_of(mesh.nodes, quads).ravel(), len(mesh.at))
         at_corner = np.maximum(np.rint(total / 90.0), 1.0).astype(np.int64)
-        ideal_at_boundary = np.where(mesh.held == AT_REST_THERE, at_corner, 2)
+        ideal_at_boundary = np.where(mesh.held == RESTING_NODE, at_corner, 2)
         ideals: list[int] = np.where(self.at_boundary, ideal_at_boundary, 4).tolist()
         return ideals
 
@@ -93,7 +93,7 @@ class Moves:
         a, b, c, d = corners[k:] + corners[:k]
         if mesh.held[c] > mesh.held[a] or (self.at_boundary[c] and not self.at_boundary[a]):
             a, b, c, d = c, d, a, b
-        if mesh.held[c] != FREE:
+        if mesh.held[c] != FREE_NODE:
             return self._merge_along(q, [a, b, c, d])
         if any(len(mesh.at[v]) <= (1 if self.at_boundary[v] else FEWEST_QUADS) for v in (b, d)):
             return None
@@ -117,7 +117,9 @@ class Moves:
             b, d = d, b
         between, across = d, b
         if not (
-            self.at_boundary[between] and len(mesh.at[between]) == 1 and mesh.held[between] == mesh.held[c] == ALONG
+            self.at_boundary[between]
+            and len(mesh.at[between]) == 1
+            and mesh.held[between] == mesh.held[c] == SLIDING_NODE
         ):
             return None
         if not self.is_chain(a, between) or not self.is_chain(c, between):
@@ -169,7 +171,7 @@ class Moves:
     def splits(self, v: int) -> list[Move]:
         """Split a node inside in two, in each way that is not hopeless: a new node takes the quads between two neighbours."""
         mesh, ring = self.mesh, self.ring_of(v)
-        if mesh.held[v] != FREE or not mesh.free or any(self.is_chain(v, w) for w in ring):
+        if mesh.held[v] != FREE_NODE or not mesh.free or any(self.is_chain(v, w) for w in ring):
             return []
         count, fresh, found = len(ring), mesh.free[-1], []
         for i in range(count):

@@ -10,7 +10,7 @@ import numpy as np
 from .quad_mesh import QuadMesh
 from .quad_moves import NO_PAIR, Move, Moves
 
-BARRIER = 0.6  # most energy that the first of two moves may cost
+MOST_COST_OF_FIRST_MOVE = 0.6  # most energy that the first of two moves may cost
 LEAST_GAIN = 1e-3  # least energy that a move must gain
 MOST_PRICE = 0.25  # largest energy that an average quad is assumed to have
 # what the square of the members too many or too few at a node counts beside the energy, and counts once few are left
@@ -101,7 +101,7 @@ class Search:
         """Make a move if the energy falls by it, or by it and another after it."""
         if move is None:
             return False
-        first = self.make(move, BARRIER if self.twice else -LEAST_GAIN)
+        first = self.make(move, MOST_COST_OF_FIRST_MOVE if self.twice else -LEAST_GAIN)
         if first is None:
             return False
         if first.growth < -LEAST_GAIN:
@@ -142,7 +142,7 @@ class Search:
                     any(self.try_move(move) for move in moves.splits(w))
 
 
-def search_once(search: Search, *, twice: bool) -> float:
+def search_quads_once(search: Search, *, twice: bool) -> float:
     """Try the moves at all irregular nodes once and settle; returns the cost of a quad.
 
     twice : whether moves that cost energy are followed by another

@@ -15,13 +15,13 @@ from ..improve.sliding_nodes import with_boundary_members, with_line_sets
 from ..improve.working_mesh import WorkingMesh
 from ..runtime.progress import Progress
 from ..surface.scratch import with_own_scratch
-from .collapse import collapse
+from .collapse import collapse_to_lattice
 from .fine_mesh import FineMesh, fine_mesh
 from .last_settling import settle_last, shortfall, wide_corners
 from .lead import Panels
 from .pairing import pairs_of
 from .quad_mesh import QuadMesh
-from .quad_search import IRREGULAR_PRICE, LED_IRREGULAR_PRICE, Search, search_once
+from .quad_search import IRREGULAR_PRICE, LED_IRREGULAR_PRICE, Search, search_quads_once
 from .row_lengths import row_lengths
 from .rows import Guide, RowStart, find_rows, lattice_places, offsets_of_edges, principal_directions, spread_rows
 from .stops import at_stops, slide_back
@@ -63,7 +63,7 @@ LEFT_BEFORE_ROUND = {
 MOST_ROUNDS = {"quick": 1, "normal": 6, "best": 12}  # further rounds of the search
 LITTLE_LEFT = 0.05  # cost of a quad after a search below which no other start can be much better
 LEAST_FALL = 0.01  # share of the cost that a round must gain for another to follow
-PARTS = 3  # pieces that a member of the triangles becomes in the fine mesh
+PARTS_OF_MEMBER = 3  # pieces that a member of the triangles becomes in the fine mesh
 FIRST_SWEEPS = 25  # most sweeps before the search
 FIRST_NEAR = 0.4  # distance of a node from the centre of its patch that gets it a new one before the search [members]
 
@@ -107,7 +107,7 @@ def quads_of(
     report(0.0)
     grid = at_stops(grid, boundary.stops, settings.length)
     mesh = opened(grid)
-    coarse, fine = fine_mesh(grid, mesh, 1), fine_mesh(grid, mesh, PARTS)
+    coarse, fine = fine_mesh(grid, mesh, 1), fine_mesh(grid, mesh, PARTS_OF_MEMBER)
     closer = [replace(each, length=each.length * row_lengths(mesh, each.nodes)) for each in (coarse, fine)]
     guide = principal_directions(mesh, len(coarse.nodes)) if settings.rows == "curvature" else None
     price = IRREGULAR_PRICE if guide is None else LED_IRREGULAR_PRICE
@@ -117,7 +117,7 @@ def quads_of(
         on = closer if start.bent else (coarse, fine)
         first, work = _laid(grid, on[0], on[1], start, guide, opened)
         before, search = work.grid(first), Search(work, price)
-        tried.append(_Tried(search_once(search, twice=False), number, first, search, before))
+        tried.append(_Tried(search_quads_once(search, twice=False), number, first, search, before))
         if tried[-1].cost < LITTLE_LEFT and not wide_corners(work):
             break
     tried = _best_of(tried, settings.effort, report)
@@ -159,7 +159,7 @@ def _best_of(tried: list[_Tried], effort: str, report: Callable[[float], None]) 
         sound = [each for each in tried if not wide_corners(each.search.mesh)]
         tried = sorted(sound or tried, key=lambda each: each[:2])[: left[min(number, len(left) - 1)]]
         last = tried[0].cost
-        tried = [each._replace(cost=search_once(each.search, twice=effort != "quick")) for each in tried]
+        tried = [each._replace(cost=search_quads_once(each.search, twice=effort != "quick")) for each in tried]
         stagnates = number >= len(left) - 1 and tried[0].cost > (1.0 - LEAST_FALL) * last
         if stagnates and refined:
             break
@@ -180,7 +180,7 @@ def _laid(
 ) -> tuple[Grid, QuadMesh]:
     """Return the quads of one start as a grid, and the same settled but not yet searched."""
     rows = spread_rows(find_rows(coarse, start, guide), coarse, fine)
-    lattice = collapse(fine, lattice_places(fine, rows), offsets_of_edges(fine, rows))
+    lattice = collapse_to_lattice(fine, lattice_places(fine, rows), offsets_of_edges(fine, rows))
     panels = Panels(lattice, *pairs_of(lattice))
     panels.lead_all()
     nodes, quads, _, chains = panels.result()

@@ -17,10 +17,10 @@ from scipy.sparse import coo_matrix, csc_matrix, diags
 from scipy.spatial import cKDTree
 
 from ..improve.working_mesh import WorkingMesh
-from ..kernels.surface.local_surface import HEIGHTS, NORMAL, TANGENT
+from ..kernels.cells.quads import RESTING_NODE, SLIDING_NODE
 from ..scan.vectors import dots
 from .factor import factored
-from .fine_mesh import ALONG, AT_REST_THERE, FineMesh
+from .fine_mesh import FineMesh
 from .stops import ways_along
 
 DIRECTION_TURNS = 30  # most turns of diffusion and normalization of the directions
@@ -88,7 +88,7 @@ def find_rows(mesh: FineMesh, start: RowStart, guide: Guide | None = None) -> La
 def principal_directions(mesh: WorkingMesh, count: int) -> Guide:
     """Return the direction of greatest curvature at the first nodes of an opened grid, and how much the curvatures differ there."""
     patch = mesh.patches[:count]
-    u, normal, heights = (patch[:, k : k + size] for k, size in ((TANGENT, 3), (NORMAL, 3), (HEIGHTS, 6)))
+    u, normal, heights = patch["tangent"], patch["normal"], patch["heights"]
     v = np.cross(normal, u)
     xx, xy, yy = 2.0 * heights[:, 3], heights[:, 4], 2.0 * heights[:, 5]
     angle = 0.5 * np.arctan2(2.0 * xy, xx - yy)
@@ -225,7 +225,7 @@ def _lattice(
         runs_along = np.abs(dots(run, along[v])) > np.abs(dots(run, across[v]))
         weight[v[runs_along], 1] = HELD_WEIGHT
         weight[v[~runs_along], 0] = HELD_WEIGHT
-    weight[mesh.held == AT_REST_THERE] = HELD_WEIGHT
+    weight[mesh.held == RESTING_NODE] = HELD_WEIGHT
     if not weight.any():
         weight[0] = 1e-3
     pull = np.repeat(weight.ravel(), 2)
@@ -263,6 +263,6 @@ def lattice_places(mesh: FineMesh, rows: LatticeRows) -> np.ndarray:
     """Return the place of the lattice node nearest to each node of the fine mesh (F, 3), for those of chains as near on the chain."""
     offset = rows.offset * mesh.length[:, None]
     way = offset[:, :1] * rows.along + offset[:, 1:] * rows.across
-    slides, run = mesh.held == ALONG, ways_along(mesh.nodes, mesh.chains)
+    slides, run = mesh.held == SLIDING_NODE, ways_along(mesh.nodes, mesh.chains)
     way[slides] = dots(way[slides], run[slides])[:, None] * run[slides]
     return mesh.nodes + way

@@ -35,11 +35,11 @@ def demo_parser() -> Parser:
 def make_demo(values: Namespace) -> None:
     """Do the main job on a bundled scan."""
     from ..report.terminal import Bars
-    from .demo_files import DEMOS, RESULTS, save_demo
+    from .demo_files import DEMO_RESULTS, DEMOS, save_demo
 
     demo = DEMOS[values.demo]
     folder = result_folder(values.out or values.outs or f"scantruss-demo/{values.demo}")
-    for name in RESULTS:
+    for name in DEMO_RESULTS:
         claim(folder / name, "result", {}, force=values.force)
     with Bars() as bars:
         cloud = read_scan(str(demo.scan), demo.settings, bars)

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from ..grid.grid import Grid
     from ..scan.cloud import PointCloud
 
-RESULTS = ("grid.obj", "grid.json", "grid.png", "grid.settings.json", "report.json", "model.3mf")
+DEMO_RESULTS = ("grid.obj", "grid.json", "grid.png", "grid.settings.json", "report.json", "model.3mf")
 MEMBER_DIAMETER = 1.2  #: of the printed model [mm]
 NODE_DIAMETER = 2.0  #: of the printed model [mm]
 
@@ -69,7 +69,7 @@ def save_demo(demo: Demo, folder: Path, grid: Grid, cloud: PointCloud, *, force:
     style = FileStyle(views=(demo.view,))
     with SaveTogether("" if force else "result") as save:
         save.make_folder(folder)
-        for name in RESULTS[:3]:
+        for name in DEMO_RESULTS[:3]:
             write(grid, save.beside(folder / name), cloud=cloud, style=style)
         save.json(folder / "grid.settings.json", (grid.settings or demo.settings).to_dict())
         save.json(folder / "report.json", report_of(grid, len(cloud.points)))
@@ -80,4 +80,4 @@ def save_demo(demo: Demo, folder: Path, grid: Grid, cloud: PointCloud, *, force:
             node_diameter=NODE_DIAMETER * millimetre,
             scale=demo.scale,
         )
-    return [folder / name for name in RESULTS]
+    return [folder / name for name in DEMO_RESULTS]

@@ -91,7 +91,7 @@ def style_of(values: Namespace) -> FileStyle:
 
 def grid(values: Namespace) -> None:
     """Make a grid and save it with its settings."""
-    from ..export.formats import check_unit
+    from ..export.formats import check_model_unit
     from ..report.figures import report_of
     from ..report.terminal import Bars
     from ..runtime.files import SaveTogether
@@ -108,7 +108,7 @@ def grid(values: Namespace) -> None:
         settings = settings_to_read(values, settings, bars)
         cloud = read_scan(values.scan, settings, bars)
         for out in outs:
-            check_unit(out, cloud.unit)
+            check_model_unit(out, cloud.unit)
         spent = perf_counter() - started
         advice = None
         if not has_length(values):

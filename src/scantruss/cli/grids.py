@@ -12,16 +12,18 @@ if TYPE_CHECKING:
     from ..structure.truss import Truss
     from .options import Parser
 
-HEAD = 200  # bytes of a file in which its format stands
-COMMENTS = 4_000  # bytes in which the comments of an OBJ or PLY of ours stand
-DRAWN = ".obj .ply .dxf .3dm .ifc .compas.json"  # that `read_model` reads
+BYTES_OF_COMMENTS = 4_000  # bytes in which the comments of an OBJ or PLY of ours stand
+BYTES_OF_HEAD = 200  # bytes of a file in which its format stands
+DRAWN_SUFFIXES = ".obj .ply .dxf .3dm .ifc .compas.json"  # that `read_model` reads
 
 
 def add_grid(parser: Parser, about: str, name: str = "grid", metavar: str = "GRID") -> None:
     """Add the argument of a grid, and how one that others drew is read."""
     from .options import number
 
-    parser.add_argument(name, metavar=metavar, help=f"{about}, or lines or faces from another program: {DRAWN}")
+    parser.add_argument(
+        name, metavar=metavar, help=f"{about}, or lines or faces from another program: {DRAWN_SUFFIXES}"
+    )
     parser.add_argument(
         "--merge",
         metavar="D",
@@ -60,7 +62,7 @@ def read_grid_or_structure(
     from ..structure.json import STRUCTURE_FORMAT, read_checked
 
     with Path(path).open("rb") as file:
-        if f'"{STRUCTURE_FORMAT}"'.encode() in file.read(HEAD):
+        if f'"{STRUCTURE_FORMAT}"'.encode() in file.read(BYTES_OF_HEAD):
             return read_checked(path)
     return read_saved_grid(path, merge, keep_failed, bars), None
 
@@ -74,10 +76,10 @@ def check_drawing_passed(path: str, keep_failed: bool) -> None:
         It did, and is not to be used all the same.
     """
     from ..errors import CertificateError
-    from ..export.obj import FAILED
+    from ..export.obj import FAILED_LINE
 
     with Path(path).open("rb") as file:
-        first = file.read(COMMENTS).decode("latin-1").splitlines()
-    if not keep_failed and (said := next((line for line in first if FAILED in line), "")):
-        words = said.partition(FAILED)[2]
-        raise CertificateError(f"{path} is of a grid that {FAILED}{words}; --keep-failed uses it anyway")
+        first = file.read(BYTES_OF_COMMENTS).decode("latin-1").splitlines()
+    if not keep_failed and (said := next((line for line in first if FAILED_LINE in line), "")):
+        words = said.partition(FAILED_LINE)[2]
+        raise CertificateError(f"{path} is of a grid that {FAILED_LINE}{words}; --keep-failed uses it anyway")

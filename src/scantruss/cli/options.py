@@ -225,7 +225,15 @@ def describe(spec: Field[Any]) -> str:
     about = spec.metadata
     notes = [note for note in (about["symbol"], about["source"]) if note]
     if spec.default is not MISSING and spec.name != "length" and spec.default not in ("", (), None):
-        notes.append(f"default {spec.default}" + (f" {about['unit']}" if about["unit"] else ""))
+        value = spec.default
+        words = (
+            ("off", "on")[value]
+            if isinstance(value, bool)
+            else f"{value:g}"
+            if isinstance(value, float)
+            else f"{value}"
+        )
+        notes.append(f"default {words}" + (f" {about['unit']}s" if about["unit"] else ""))
     elif about["unit"]:
         notes.append(f"in {about['unit']}s")
     return (str(about["help"]) + (f" ({'; '.join(notes)})" if notes else "")).replace("%", "%%")

@@ -13,8 +13,8 @@ from ..settings import CURVATURE
 from ..settings.values import SYMMETRIES_FOUND
 
 Taken = dict[Path, str]  # place of a file -> what is there
-VALUE = re.compile(r"[a-z-]{2,}:[-+]?\d")  # begin of the value of an option, such as snow:1kN/m2
-SUFFIX = re.compile(r"\.[a-z]\w*$", re.IGNORECASE)  # end of the name of a file
+OPTION_VALUE = re.compile(r"[a-z-]{2,}:[-+]?\d")  # begin of the value of an option, such as snow:1kN/m2
+FILE_SUFFIX = re.compile(r"\.[a-z]\w*$", re.IGNORECASE)  # end of the name of a file
 
 
 def inputs_of(values: Namespace) -> Taken:
@@ -65,7 +65,7 @@ def outs_of(values: Namespace) -> list[Path]:
 
     given = getattr(values, "outs", None) or []
     words = [*([given] if isinstance(given, str) else given), *values.more_outs]
-    if other := next((word for word in words if VALUE.match(word) and not SUFFIX.search(word)), None):
+    if other := next((word for word in words if OPTION_VALUE.match(word) and not FILE_SUFFIX.search(word)), None):
         raise UsageError(
             f"{other} is not a file to write; if it belongs to the option before it, separate its values by commas, without blanks"
         )

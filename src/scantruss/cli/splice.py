@@ -48,7 +48,7 @@ def splice(values: Namespace) -> None:
     from ..scan.formats.writing import write_points
 
     files = scan_files(values.scans)
-    outs, poses_file = check_outputs(values)
+    outs, poses_file = merged_outputs(values)
     names = names_of(files)
     with Bars() as bars:
         result = splice_files(values, files, names, bars)
@@ -84,7 +84,7 @@ def names_of(files: list[Path]) -> list[str]:
     return names if len(set(names)) == len(names) else [file.as_posix() for file in files]
 
 
-def check_outputs(values: Namespace) -> tuple[list[Path], Path]:
+def merged_outputs(values: Namespace) -> tuple[list[Path], Path]:
     """Return the clouds and the file of poses; what cannot be written is refused before anything is read or computed."""
     from ..runtime.places import check_place
 

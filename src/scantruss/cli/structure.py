@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from argparse import SUPPRESS, Namespace
+from collections.abc import Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -92,7 +93,7 @@ def structure_parser() -> Parser:
 def structure(values: Namespace) -> None:
     """Make the structure of a saved grid, solve it and save it."""
     from ..export.formats import STRUCTURE, check_output, model_of
-    from ..report.terminal import Bars, print_lines, print_table
+    from ..report.terminal import Bars, print_lines
     from ..runtime.files import SaveTogether
     from ..runtime.places import check_place
     from .convert import claim_models, write_models
@@ -112,21 +113,7 @@ def structure(values: Namespace) -> None:
     if plot is not None:
         claim(plot, "picture", taken, force=values.force)
     from ..grid.certificate import check_passed
-    from ..structure.doubts import doubts_of_settings, support_words
-    from ..structure.modes import vibration_modes, worst_buckling
     from ..structure.path_report import encode_path, path_expectation
-    from ..structure.report import report_structure
-    from ..structure.report_lines import (
-        STRUCTURE_HEAD,
-        half_lines,
-        mode_lines,
-        node_lines,
-        sizing_lines,
-        structure_lines,
-        unlisted_lines,
-    )
-    from ..structure.sizing import SizingRound, size_members, weight_curve
-    from ..structure.statics import factor_stiffness, solve
     from ..structure.truss import Truss
 
     with Bars() as bars, SaveTogether("" if values.force else "result") as save:
@@ -137,25 +124,8 @@ def structure(values: Namespace) -> None:
         if values.dry_run:
             print_lines([path_expectation(truss, settings.path_steps)])
             return
-        rounds: list[SizingRound] = []
-        weights = None
-        if settings.size:
-            plain, truss = truss, size_members(truss, settings.size, settings.checks, rounds, by=settings.size_by)
-            if report_place or any(out.suffix.lower() in (".html", ".pdf") for out in outs):
-                weights = weight_curve(plain, truss, settings.size, settings.checks, settings.size_by)
-        factored = factor_stiffness(truss)
-        solution = solve(truss, factored)
-        bars("modes", 0.4)
-        modes = settings.buckling or int(settings.size > 0)
-        buckling = worst_buckling(factored, solution, modes) if modes else None
-        vibration = vibration_modes(factored, settings.frequencies) if settings.frequencies else None
-        del factored  # a path makes its own, and they are large
-        path = _path(truss, settings, bars) if settings.path else None
-        bars("checks", 0.8)
-        found: dict[str, Any] = {
-            "buckling": buckling, "vibration": vibration, "path": path, "rounds": rounds, "weights": weights
-        }  # fmt: skip
-        report = report_structure(solution, settings.checks, doubts_of_settings(settings, grid), **found)
+        weighed = report_place is not None or any(out.suffix.lower() in (".html", ".pdf") for out in outs)
+        solution, report = _solved(truss, grid, settings, weighed, bars)
         bars("report", 0.0)
         models = [out for out in outs if out.suffix.lower() not in REPORT_SUFFIXES]
         written = write_models(model_of(solution, report=report), models, save, bars)
@@ -167,14 +137,62 @@ def structure(values: Namespace) -> None:
             save.beside(report_place).write_bytes(_encoded(report_place, values, settings, solution, report))
         elif report_place is not None:
             save.json(report_place, report.to_dict())
-        if plot is not None and path is not None:
-            save.beside(plot).write_bytes(encode_path(path))
+        if plot is not None and report.path is not None:
+            save.beside(plot).write_bytes(encode_path(report.path))
+    _print_report(report, [*written, *(place for place in (report_place, plot) if place)])
+
+
+def _solved(
+    truss: Truss, grid: Grid, settings: StructureSettings, weighed: bool, bars: Progress
+) -> tuple[Solution, StructureReport]:
+    """Size, solve and check a structure as its settings ask; `weighed`: with the weight for each number of sections."""
+    from ..structure.doubts import doubts_of_settings
+    from ..structure.modes import vibration_modes, worst_buckling
+    from ..structure.report import report_structure
+    from ..structure.sizing import SizingRound, size_members, weight_curve
+    from ..structure.statics import factor_stiffness, solve
+
+    rounds: list[SizingRound] = []
+    weights = None
+    if settings.size:
+        plain, truss = truss, size_members(truss, settings.size, settings.checks, rounds, by=settings.size_by)
+        if weighed:
+            weights = weight_curve(plain, truss, settings.size, settings.checks, settings.size_by)
+    factored = factor_stiffness(truss)
+    solution = solve(truss, factored)
+    bars("modes", 0.4)
+    modes = settings.buckling or int(settings.size > 0)
+    buckling = worst_buckling(factored, solution, modes) if modes else None
+    vibration = vibration_modes(factored, settings.frequencies) if settings.frequencies else None
+    del factored  # a path makes its own, and they are large
+    path = _path(truss, settings, bars) if settings.path else None
+    bars("checks", 0.8)
+    found: dict[str, Any] = {
+        "buckling": buckling, "vibration": vibration, "path": path, "rounds": rounds, "weights": weights
+    }  # fmt: skip
+    return solution, report_structure(solution, settings.checks, doubts_of_settings(settings, grid), **found)
+
+
+def _print_report(report: StructureReport, wrote: Sequence[Path]) -> None:
+    """Print the table of a structure, its lines, its warnings and the files that were written."""
+    from ..report.terminal import print_lines, print_table
+    from ..structure.doubts import support_words
+    from ..structure.report_lines import (
+        STRUCTURE_HEAD,
+        half_lines,
+        mode_lines,
+        node_lines,
+        sizing_lines,
+        structure_lines,
+        unlisted_lines,
+    )
+
+    truss = report.truss
     print_table(STRUCTURE_HEAD, structure_lines(report))
     counts = report.to_dict()["sections"]
     names = (
         " ".join(f"{name} ({count:,})" for name, count in counts.items()) if len(counts) > 1 else truss.sections[0].name
     )
-    wrote = [*written, *(place for place in (report_place, plot) if place)]
     print_lines(
         [
             *unlisted_lines(report),
@@ -185,7 +203,11 @@ def structure(values: Namespace) -> None:
             support_words(truss),
             *sizing_lines(report),
             *mode_lines(report),
-            *([] if buckling or path else ["the stability of the whole is not looked at; --buckling 1 does"]),
+            *(
+                []
+                if report.buckling or report.path
+                else ["the stability of the whole is not looked at; --buckling 1 does"]
+            ),
             *(f"warning: {words}" for words in report.warnings),
             f"wrote {' '.join(map(str, wrote))}",
         ]

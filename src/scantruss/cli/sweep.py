@@ -79,7 +79,7 @@ def _several(kind: Any) -> Callable[[str], list[Any]]:
 
 def sweep(values: Namespace) -> None:
     """Make many grids and report them."""
-    from ..report.choosing import head_of, rows_of, structure_table
+    from ..report.choosing import head_of, rows_of_designs, structure_table
     from ..report.terminal import Bars, print_lines, print_table
     from ..sweep import sweep as make_grids
     from .options import has_length
@@ -105,7 +105,7 @@ def sweep(values: Namespace) -> None:
         compiling = note_compiling(bars)
         with compiling, workers_of(values, bars, None if len(trials) > 1 else 1) as workers:
             outcomes = make_grids(cloud, trials, workers, bars, variants)
-        head, rows = head_of(varied, cloud.unit), rows_of(trials, outcomes)
+        head, rows = head_of(varied, cloud.unit), rows_of_designs(trials, outcomes)
         if not any(outcome.grid for outcome in outcomes):
             raise InputError(f"no grid came out of {len(trials)} trials; the first: {outcomes[0].fault}")
         tables = [(head, rows), *([structure_table(varied, trials, outcomes)] if variants else [])]
@@ -215,7 +215,7 @@ def _save(
 ) -> None:
     """Save grids, pictures and tables together, or nothing; `claim_results` knows their names."""
     from ..export.drawing.sheet import encode_sheet
-    from ..report.choosing import encode_page, encode_table_csv, encode_table_markdown, title_of
+    from ..report.choosing import encode_choice, encode_table_csv, encode_table_markdown, title_of
     from ..runtime.files import SaveTogether
     from ..runtime.ours import kind_of_ours
 
@@ -228,7 +228,7 @@ def _save(
         both = zip(trials, outcomes, strict=True)
         pictures = [(title_of(trial, outcome), outcome.picture) for trial, outcome in both if outcome.picture]
         grids, *structures = [(encode_table_csv(*table), encode_table_markdown(*table)) for table in tables]
-        contents = [*grids, encode_page(title, tables, trials, outcomes), encode_sheet(pictures)]
+        contents = [*grids, encode_choice(title, tables, trials, outcomes), encode_sheet(pictures)]
         for name, content in zip(SWEEP_FILES, contents, strict=True):
             save.beside(folder / name).write_bytes(content)
         for name, content in zip(SWEEP_STRUCTURES, *structures, strict=True) if structures else ():

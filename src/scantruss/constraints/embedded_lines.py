@@ -65,7 +65,7 @@ def link_around(front: lists.Front, node: int) -> None:
     The segments stand around the node in the order of their angles. At the boundary the one that comes along it stands last,
     whatever its angle: lines lie between both, also where the surface is folded so that its normal does not show it.
     """
-    count = int(front.count[lists.SEGMENTS])
+    count = int(front.counts.segments)
     live = front.state[:count] != lists.GONE
     leaving = {int(front.head[t]): t for t in np.flatnonzero((front.tail[:count] == node) & live).tolist()}
     coming = {int(front.tail[s]): s for s in np.flatnonzero((front.head[:count] == node) & live).tolist()}
@@ -107,7 +107,7 @@ def check_links(front: lists.Front, origin: np.ndarray) -> None:
     FrontError
         Names a place.
     """
-    count = int(front.count[lists.SEGMENTS])
+    count = int(front.counts.segments)
     live = np.flatnonzero(front.state[:count] != lists.GONE)
     following = front.next[live]
     broken = (following < 0) | (front.previous[following] != live) | (front.tail[following] != front.head[live])
@@ -121,7 +121,7 @@ def check_links(front: lists.Front, origin: np.ndarray) -> None:
 
 def line_members(front: lists.Front) -> np.ndarray:
     """Return the members (K, 2) of the lines of an initial front, smaller node first, sorted: those with segments of both directions."""
-    count = int(front.count[lists.SEGMENTS])
+    count = int(front.counts.segments)
     pairs = np.sort(np.stack([front.tail[:count], front.head[:count]], axis=1), axis=1)
     members, times = np.unique(pairs, axis=0, return_counts=True)
     found: np.ndarray = members[times == 2]

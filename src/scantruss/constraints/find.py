@@ -12,7 +12,7 @@ from ..boundary.find import Boundary, with_line_ends
 from ..errors import Place
 from ..kernels.mesh.point_location import nearest_sample
 from .fixed_lines import add_polylines
-from .fixed_nodes import check_positions
+from .fixed_nodes import check_fixed_positions
 from .network import NO_LINES, Lines, Network
 from .ridge_ends import Ridge
 from .ridges import add_ridges, cut_around, find_ridges, without
@@ -29,6 +29,11 @@ class Constraints:
 
     positions: np.ndarray  #: (K, 3) places of fixed nodes, relative to the cloud's origin [scan unit]
     lines: Lines = NO_LINES  #: fixed lines and ridges
+
+    def __repr__(self) -> str:
+        """Say how many there are of each."""
+        ridges = sum(whole.ridge for whole in self.lines.whole)
+        return f"Constraints({len(self.positions)} fixed nodes, {len(self.lines.whole) - ridges} fixed lines, {ridges} ridges)"
 
 
 def find_constraints(
@@ -58,7 +63,7 @@ def find_constraints(
         A fixed position is farther than half a member from the scan or nearer than that to another; a fixed line is too short or
         leaves the scan.
     """
-    positions = check_positions(settings.fixed, samples, settings.length)
+    positions = check_fixed_positions(settings.fixed, samples, settings.length)
     ridges = ridges_away_from(faults, samples, settings)
     boundary = with_ridge_ends(boundary, ridges, samples, settings.length)
     lines = find_lines(samples, boundary, ridges, settings)

@@ -10,7 +10,7 @@ from ..errors import InputError, words_of_number
 from ..surface.samples import SurfaceSamples, distance_from_scan, local_field
 
 
-def check_positions(
+def check_fixed_positions(
     fixed: Sequence[Sequence[float]] | np.ndarray, samples: SurfaceSamples, length: float
 ) -> np.ndarray:
     """Return fixed positions relative to the cloud's origin, (K, 3) [scan unit].

@@ -6,11 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..kernels.geometry.quadric import COLUMNS
+from ..kernels.geometry.quadric import FIT_POINT
 from ..kernels.mesh.point_location import nearest_sample
 from ..kernels.surface import ridges as kernels
 from ..kernels.surface.local_surface import walk
-from ..kernels.surface.ridges import BEND, FOUND, GAIN, OFF
+from ..kernels.surface.ridges import FOLD
+from ..runtime.jit import new_record
 from ..runtime.watch import Watch
 from ..surface.samples import distance_from_scan
 
@@ -23,6 +24,7 @@ FOLD_RADII = (0.8, 1.2, 0.6, 0.45)  # [member lengths]
 FEWEST_SPACINGS = 2.6  # least radius, in distances between points
 FIRST_NEAR_CORNERS = 2  # number of the first of the radii for places near corners
 POINTS_OF_A_FIT = 300.0  # points to which a fold is fitted, some more or less
+MOST_POINTS_OF_FIT = 6000  # points that there is room for
 FEWEST_OF_A_SAMPLE = 3.0  # of each sample at least
 FOLD_FITS_WITHIN = 0.02  # distance of the points from a fold up to which no smaller radius is tried [member lengths]
 FOLD_STRIDE = 0.25  # step from place to place along a fold [member lengths]
@@ -67,18 +69,18 @@ class Tracer:
         self.most = [POINTS_OF_A_FIT * of_sample / (np.pi * radius**2) for radius in self.radii]
         self.spacing = samples.spacing
         self.fits = max(FOLD_FITS_WITHIN * settings.length, 1.5 * float(np.median(samples.thickness)))
-        self.buffer = np.empty((6000, COLUMNS))
+        self.buffer = np.empty(MOST_POINTS_OF_FIT, FIT_POINT)
         self.origin = samples.origin
         self.watch = Watch(
             TANGLED_RIDGES, samples.area / (FOLDS_MEET_WITHIN * FOLD_STRIDE * settings.length**2), MOST_TRACED
         )
 
-    def fold_at(self, sample: int, place: np.ndarray, towards: np.ndarray, first: int = 0) -> np.ndarray | None:
-        """The fold (FOUND,) around a place (see `kernels.surface.ridges.fit_fold`), None where no fold fits.
+    def fold_at(self, sample: int, place: np.ndarray, towards: np.ndarray, first: int = 0) -> np.record | None:
+        """The fold around a place (see `kernels.surface.ridges.fit_fold`), None where no fold fits.
 
         first : number of the radius that is tried first
         """
-        fold, best = np.zeros(FOUND), None
+        fold, best = new_record(FOLD), None
         x, y, z = place.tolist()
         a, b, c = towards.tolist()
         for number, (radius, most) in enumerate(zip(self.radii, self.most, strict=True)):
@@ -86,25 +88,25 @@ class Tracer:
                 continue
             surface = self.surface._replace(patch_points=max(most, FEWEST_OF_A_SAMPLE))
             fits = kernels.fit_fold(surface, sample, (x, y, z), (a, b, c), radius, self.buffer, fold)
-            if not fits or fold[GAIN] < FOLD_OVER_SMOOTH or fold[OFF] > ROUGHEST_SIDE * self.length:
+            if not fits or fold.gain < FOLD_OVER_SMOOTH or fold.off > ROUGHEST_SIDE * self.length:
                 continue
-            if self._is_clear(fold) and fold[BEND] >= SHARP_SHARE * self.angle:
+            if self._is_clear(fold) and fold.bend >= SHARP_SHARE * self.angle:
                 return fold
             if best is None or self._rank(fold) > self._rank(best):
                 best = fold.copy()
         return best
 
-    def _is_clear(self, fold: np.ndarray) -> bool:
+    def _is_clear(self, fold: np.record) -> bool:
         """Whether a fold fits and is one to follow."""
-        return bool(fold[OFF] <= self.fits and fold[BEND] >= WEAK_FOLD * self.angle)
+        return bool(fold.off <= self.fits and fold.bend >= WEAK_FOLD * self.angle)
 
-    def _rank(self, fold: np.ndarray) -> tuple[bool, float]:
+    def _rank(self, fold: np.record) -> tuple[bool, float]:
         """What is better of two folds: clear ones that bend most, else those that fit best."""
         clear = self._is_clear(fold)
-        return clear, float(fold[BEND] if clear else -fold[OFF])
+        return clear, float(fold.bend if clear else -fold.off)
 
     def trace(self) -> list[np.ndarray]:
-        """The folds (K, FOUND) a stride apart along each line of folds that is long and sharp enough to be a ridge."""
+        """The folds (K,) FOLD, a stride apart along each line of folds that is long and sharp enough to be a ridge."""
         seeds = self._seeds()
         fresh = np.ones(len(seeds), bool)
         places = self.surface.mean[seeds]
@@ -120,16 +122,16 @@ class Tracer:
                 break
             if (
                 fold is not None
-                and fold[BEND] > WEAK_FOLD * self.angle
-                and np.linalg.norm(fold[:3] - places[k]) < 0.5 * self.length
+                and fold.bend > WEAK_FOLD * self.angle
+                and np.linalg.norm(fold.place - places[k]) < 0.5 * self.length
             ):
-                folds = self._follow(sample, fold, [ridge[:, :3] for ridge in ridges])
-                self.watch.note(len(folds), folds[-1, :3] + self.origin)
-                even = [part for part in parts_of(folds) if is_even(part, WEAK_FOLD * self.angle, self.sharpest)]
+                folds = self._follow(sample, fold, [ridge["place"] for ridge in ridges])
+                self.watch.note(len(folds), folds["place"][-1] + self.origin)
+                even = [part for part in parts_of_fold(folds) if is_even(part, WEAK_FOLD * self.angle, self.sharpest)]
                 even = [part for part in even if not rough or is_clear_on_rough(part, self.angle)]
                 ridges += even
                 misses = 0 if even else misses
-                for place in folds[:, :3]:
+                for place in folds["place"]:
                     fresh &= ((places - place) ** 2).sum(axis=1) > (2.4 * LOOK_SPACING * self.length) ** 2
         return ridges
 
@@ -139,9 +141,9 @@ class Tracer:
         for share in PLACES_BETWEEN_CORNERS:
             place = first + share * (last - first)
             fold = self.fold_at(nearest_sample(self.surface, *place.tolist()), place, ahead, len(self.radii) - 1)
-            if fold is None or fold[BEND] < WEAK_FOLD * self.angle or abs(fold[3:6] @ ahead) < LEAST_TURN_COSINE:
+            if fold is None or fold.bend < WEAK_FOLD * self.angle or abs(fold.ahead @ ahead) < LEAST_TURN_COSINE:
                 return False
-            if np.linalg.norm(fold[:3] - place) > 0.6 * FOLD_STRIDE * self.length:
+            if np.linalg.norm(fold.place - place) > 0.6 * FOLD_STRIDE * self.length:
                 return False
         return True
 
@@ -163,37 +165,40 @@ class Tracer:
         least, apart = LIKELY_FOLD * self.angle, LOOK_SPACING * self.length
         return likely[: kernels.keep_folded(self.surface, likely, self.radii[0], least, apart, self.buffer, note)]
 
-    def _follow(self, sample: int, fold: np.ndarray, others: list[np.ndarray]) -> np.ndarray:
+    def _follow(self, sample: int, fold: np.record, others: list[np.ndarray]) -> np.ndarray:
         """Go along a fold to both sides until it fades, leaves the scan or comes to another; back to its start where it is a ring."""
-        ahead, ring = self._march(sample, fold, 1.0, fold[:3], others)
-        back: list[np.ndarray] = []
+        ahead, ring = self._march(sample, fold, 1.0, fold.place, others)
+        back: list[np.record] = []
         if not ring:
             back, ring = self._march(
-                sample, fold, -1.0, ahead[-1][:3] if len(ahead) > PLACES_OF_SHORTEST_RING else fold[:3], others
+                sample, fold, -1.0, ahead[-1].place if len(ahead) > PLACES_OF_SHORTEST_RING else fold.place, others
             )
         folds = np.array([*back[::-1], fold, *ahead])
         if not ring:
-            folds[:, :3] = smoothed(folds[:, :3])
+            folds["place"] = smoothed(folds["place"])
             return folds
         folds = folds[:-1]  # the last place lies beside the first
         around = np.take(
-            folds[:, :3], np.arange(-PLACES_OF_SHORTEST_RING, len(folds) + PLACES_OF_SHORTEST_RING), axis=0, mode="wrap"
+            folds["place"],
+            np.arange(-PLACES_OF_SHORTEST_RING, len(folds) + PLACES_OF_SHORTEST_RING),
+            axis=0,
+            mode="wrap",
         )
-        folds[:, :3] = smoothed(around)[PLACES_OF_SHORTEST_RING:-PLACES_OF_SHORTEST_RING]
+        folds["place"] = smoothed(around)[PLACES_OF_SHORTEST_RING:-PLACES_OF_SHORTEST_RING]
         return np.concatenate([folds, folds[:1]])
 
     def _march(
-        self, sample: int, fold: np.ndarray, sign: float, goal: np.ndarray, others: list[np.ndarray]
-    ) -> tuple[list[np.ndarray], bool]:
+        self, sample: int, fold: np.record, sign: float, goal: np.ndarray, others: list[np.ndarray]
+    ) -> tuple[list[np.record], bool]:
         """Folds stride by stride to one side of a first one; whether they came to the goal, which closes a ring."""
-        ahead, at = sign * fold[3:6], fold
-        steps: list[np.ndarray] = []
+        ahead, at = sign * fold.ahead, fold
+        steps: list[np.record] = []
         known, own = np.concatenate([np.zeros((0, 3)), *others]), np.empty((MOST_PLACES_OF_FOLD, 3))
         meets = FOLDS_MEET_WITHIN * self.length
         missed = 0
         while len(steps) < MOST_PLACES_OF_FOLD and missed <= MISSED_PLACES:
             stride = (1 + missed) * FOLD_STRIDE * self.length
-            place = at[:3] + stride * ahead
+            place = at.place + stride * ahead
             x, y, z = place.tolist()
             sample = walk(self.surface, sample, (x, y, z))
             if np.linalg.norm(self.surface.mean[sample] - place) > OFF_SCAN * self.length:
@@ -202,23 +207,23 @@ class Tracer:
             if after is None or not self._goes_on(after, place, ahead):
                 missed += 1
                 continue
-            after[3:6] *= np.sign(after[3:6] @ ahead)
+            after.ahead *= np.sign(after.ahead @ ahead)
             steps.append(after)
-            at, ahead, missed = after, after[3:6], 0
-            if len(steps) > PLACES_OF_SHORTEST_RING and np.linalg.norm(at[:3] - goal) < meets:
+            at, ahead, missed = after, after.ahead, 0
+            if len(steps) > PLACES_OF_SHORTEST_RING and np.linalg.norm(at.place - goal) < meets:
                 return steps, True
-            own[len(steps) - 1] = at[:3]
+            own[len(steps) - 1] = at.place
             for places in (known, own[: max(len(steps) - PLACES_OF_SHORTEST_RING, 0)]):
-                if len(places) and ((places - at[:3]) ** 2).sum(axis=1).min() < meets**2:
+                if len(places) and ((places - at.place) ** 2).sum(axis=1).min() < meets**2:
                     return steps, False
         return steps, False
 
-    def _goes_on(self, fold: np.ndarray, place: np.ndarray, ahead: np.ndarray) -> bool:
+    def _goes_on(self, fold: np.record, place: np.ndarray, ahead: np.ndarray) -> bool:
         """Whether the fold found where a line of folds should go on belongs to it."""
         return bool(
-            fold[BEND] >= FADED_FOLD * self.angle
-            and np.linalg.norm(fold[:3] - place) < 0.6 * FOLD_STRIDE * self.length
-            and abs(fold[3:6] @ ahead) > LEAST_TURN_COSINE
+            fold.bend >= FADED_FOLD * self.angle
+            and np.linalg.norm(fold.place - place) < 0.6 * FOLD_STRIDE * self.length
+            and abs(fold.ahead @ ahead) > LEAST_TURN_COSINE
         )
 
     def _above(self, place: np.ndarray) -> np.ndarray:
@@ -226,7 +231,7 @@ class Tracer:
         x, y, z = place.tolist()
         sample = nearest_sample(self.surface, x, y, z)
         *normal, taken = kernels.points_around(self.surface, sample, (x, y, z), self.radii[-1], self.buffer)
-        ahead, away = np.array(normal), self.buffer[:taken, :3]
+        ahead, away = np.array(normal), self.buffer["place"][:taken]
         if taken == 0:
             return np.zeros(3)
         squares = (away**2).sum(axis=1)
@@ -254,17 +259,17 @@ SHARPEST_EDGE = 155.0  # most that a surface bends at a fold where sharp edges o
 # median change of the bend from place to place, at most, of folds by up to 50 degrees and by 70 or more [degree]: blunt crests of nature
 # are as sharp as blunt ridges that were made, but not as even
 EVEN_FOLDS = (0.5, 3.5)
-BLUNT, ACUTE = 50.0, 70.0  # angles of folds between which the allowed change of the bend grows [degree]
+BLUNT_FOLD, ACUTE_FOLD = 50.0, 70.0  # angles of folds between which the allowed change of the bend grows [degree]
 BY_NOISE = 0.2  # change of the bend that noise explains, for the root of the gain 1 [radian]
 SURE_GAIN = 25.0  # median gain, at least (F statistic)
 
 
-def parts_of(folds: np.ndarray) -> list[np.ndarray]:
-    """The parts (K, FOUND) of a line of folds between its corners, where its direction turns more than before and after."""
+def parts_of_fold(folds: np.ndarray) -> list[np.ndarray]:
+    """The parts (K,) FOLD of a line of folds between its corners, where its direction turns more than before and after."""
     count = len(folds)
     if count < 4 * PLACES_OF_TURN:
         return [folds]
-    ahead = folds[PLACES_OF_TURN:, :3] - folds[:-PLACES_OF_TURN, :3]
+    ahead = folds["place"][PLACES_OF_TURN:] - folds["place"][:-PLACES_OF_TURN]
     ahead /= np.maximum(np.linalg.norm(ahead, axis=1), 1e-300)[:, None]
     turn = np.zeros(count)
     turn[PLACES_OF_TURN : count - PLACES_OF_TURN] = np.arccos(
@@ -283,21 +288,21 @@ def parts_of(folds: np.ndarray) -> list[np.ndarray]:
 
 
 def is_clear_on_rough(folds: np.ndarray, angle: float) -> bool:
-    """Whether an even line of folds (K, FOUND) is so long and sharp that it is a ridge even where many other places look folded."""
-    return len(folds) * FOLD_STRIDE >= LEAST_ROUGH_RIDGE and float(np.median(folds[:, BEND])) >= ROUGH_SHARE * angle
+    """Whether an even line of folds (K,) FOLD is so long and sharp that it is a ridge even where many other places look folded."""
+    return len(folds) * FOLD_STRIDE >= LEAST_ROUGH_RIDGE and float(np.median(folds["bend"])) >= ROUGH_SHARE * angle
 
 
 def is_even(folds: np.ndarray, angle: float, sharpest: float = SHARPEST_FOLD_ANGLE) -> bool:
-    """Whether a line of folds (K, FOUND), a stride apart, has an angle and is as even as a ridge: what bends evenly is."""
-    angles = folds[:, BEND]
+    """Whether a line of folds (K,) FOLD, a stride apart, has an angle and is as even as a ridge: what bends evenly is."""
+    angles = folds["bend"]
     if len(folds) * FOLD_STRIDE < SHORTEST_LINE_OF_FOLDS or (angles >= angle).sum() * FOLD_STRIDE < LEAST_FULL_LENGTH:
         return False
-    ahead = np.diff(folds[:, :3], axis=0)
+    ahead = np.diff(folds["place"], axis=0)
     ahead /= np.maximum(np.linalg.norm(ahead, axis=1), 1e-300)[:, None]
     bends = np.cross(ahead[1:], ahead[:-1])
     uneven = float(np.median(np.linalg.norm(np.diff(bends, axis=0), axis=1))) if len(bends) > 1 else 0.0
-    gain, bend = float(np.median(folds[:, GAIN])), np.degrees(float(np.median(angles)))
-    most = np.radians(np.interp(bend, (BLUNT, ACUTE), EVEN_FOLDS)) + BY_NOISE / np.sqrt(max(gain, 1.0))
+    gain, bend = float(np.median(folds["gain"])), np.degrees(float(np.median(angles)))
+    most = np.radians(np.interp(bend, (BLUNT_FOLD, ACUTE_FOLD), EVEN_FOLDS)) + BY_NOISE / np.sqrt(max(gain, 1.0))
     return bool(gain >= SURE_GAIN and uneven <= most and bend < sharpest)
 
 

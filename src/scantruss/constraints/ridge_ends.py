@@ -14,7 +14,7 @@ COSINE_TO_OTHER_END = 0.94  # least cosine of the angle between such an end and 
 RING_COSINE = 0.8
 TOUCHING_GAP = 0.6  # gap below which only one of the ends must point to the other [member lengths]
 BLURRED_PLACES = 1  # places at an end that are left out, because the third side disturbs them
-AIM, FAR_AIM = 5, 10  # places from which the direction of an end is taken, and those of a straight ridge
+AIM_PLACES, FAR_AIM_PLACES = 5, 10  # places from which the direction of an end is taken, and those of a straight ridge
 STRAIGHT_WITHIN = 0.01  # median distance of the places of a straight line from it, at most [distance of its ends]
 STRAIGHT_FITS = 4  # of a straight line, those after the first with places off it weighing less
 WAY_TO_CORNER = 1.5  # longest way from an end to a corner or another ridge [member lengths]
@@ -115,12 +115,12 @@ def end_of(line: np.ndarray, number: int, at: int) -> End:
     The very last ones lie aside, as the third side of a corner disturbs them.
     """
     towards = line if at == -1 else line[::-1]
-    some = towards[-FAR_AIM:]
+    some = towards[-FAR_AIM_PLACES:]
     middle, ahead = _straight(some)
     off = np.linalg.norm(np.cross(some - middle, ahead), axis=1)
-    if len(some) > AIM and np.median(off) < STRAIGHT_WITHIN * np.linalg.norm(some[-1] - some[0]):
+    if len(some) > AIM_PLACES and np.median(off) < STRAIGHT_WITHIN * np.linalg.norm(some[-1] - some[0]):
         return End(number, at, middle + ((towards[-1] - middle) @ ahead) * ahead, ahead)
-    return End(number, at, towards[-1], _direction(towards, AIM))
+    return End(number, at, towards[-1], _direction(towards, AIM_PLACES))
 
 
 def _straight(line: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

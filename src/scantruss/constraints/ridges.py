@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..boundary.polylines import divide_polyline
-from ..kernels.surface.ridges import BEND
 from .fixed_lines import LINE_STEP
 from .fold_tracing import FOLD_STRIDE, LEAST_FULL_LENGTH, Tracer
 from .network import Network, runs
@@ -48,7 +47,7 @@ def find_ridges(samples: SurfaceSamples, settings: Settings) -> list[Ridge]:
 
 def _find_ridges(samples: SurfaceSamples, settings: Settings) -> tuple[Ridge, ...]:
     tracer = Tracer(samples, settings)
-    traced = [Ridge(folds[:, :3], _is_sharp(folds, tracer.angle)) for folds in tracer.trace()]
+    traced = [Ridge(folds["place"], _is_sharp(folds, tracer.angle)) for folds in tracer.trace()]
     ridges = kept_ridges(join_ends(traced, settings.length), settings.length)
     ridges = [ridge.moved(tracer.onto_scan(ridge.places)) for ridge in ridges + short_ridges(ridges, tracer)]
     return tuple(sorted(ridges, key=lambda ridge: (ridge.ring, -len(ridge.places))))
@@ -122,7 +121,7 @@ def short_ridges(ridges: list[Ridge], tracer: Tracer) -> list[Ridge]:
 
 
 def _is_sharp(folds: np.ndarray, angle: float) -> bool:
-    """Whether a line of folds (K, FOUND) has the full angle along enough of it."""
-    full = folds[:, BEND] >= NEARLY_FULL_ANGLE * angle
+    """Whether a line of folds (K,) has the full angle along enough of it."""
+    full = folds["bend"] >= NEARLY_FULL_ANGLE * angle
     size = float(full.sum()) * FOLD_STRIDE
     return bool(size >= LONG_FULL or (size >= LEAST_FULL_LENGTH and full.mean() >= LEAST_FULL_SHARE))

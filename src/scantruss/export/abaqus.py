@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import FormatError
-from ..runtime.ours import MARK
+from ..runtime.ours import MADE_BY
 from ..structure.statics import dead_loads
 from .model import Model, line_loads, nodal_loads
 from .style import FileStyle
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 PER_LINE = 16  #: numbers in a line of a set
 NUMBER_WIDTH = 20  #: letters of a number, as CalculiX reads them
 ROUND_TUBE = 1e-3  #: share by which the torsional inertia of a section may differ from Iy + Iz in CalculiX
-ISOTROPIC = 0.49  #: greatest Poisson's ratio that is written
+LARGEST_POISSON_RATIO = 0.49  #: greatest Poisson's ratio that is written
 NO_SHEAR = 1e5  #: shear factor at which a beam of CalculiX is one without deformation by shear
 
 
@@ -51,7 +51,7 @@ def _check_calculix(truss: Truss) -> None:
         raise FormatError("beams of CalculiX have no hinges or springs at their ends; use --joints rigid or pinned")
     if any(case.settlement is not None for case in truss.cases):
         raise FormatError("beams of CalculiX do not follow supports that settle; use --joints pinned or another format")
-    if _poisson(truss.material) > ISOTROPIC:
+    if _poisson(truss.material) > LARGEST_POISSON_RATIO:
         raise FormatError(
             f"beams of CalculiX are isotropic, and {truss.material.name} is not; use --joints pinned or another format"
         )
@@ -86,7 +86,7 @@ def _set(kind: str, name: str, numbers: np.ndarray) -> Iterator[str]:
 
 def _lines(model: Model, truss: Truss, program: str) -> Iterator[str]:
     yield "*HEADING"
-    yield f"{MARK}; m N kg; nodes and members are counted from 1 in the order of their marks"
+    yield f"{MADE_BY}; m N kg; nodes and members are counted from 1 in the order of their marks"
     for each in truss.combinations:
         yield f"** combination {_plain(each.name)}: {' + '.join(f'{factor:g} {_plain(case)}' for case, factor in each.factors)}"
     yield "*NODE, NSET=nodes"
@@ -124,7 +124,7 @@ def _poisson(material: Material) -> float:
 
 
 def _material(material: Material) -> tuple[str, ...]:
-    poisson = min(_poisson(material), ISOTROPIC)  # of trusses alone, which do not feel it
+    poisson = min(_poisson(material), LARGEST_POISSON_RATIO)  # of trusses alone, which do not feel it
     head = ("*MATERIAL, NAME=material", "*ELASTIC", f"{material.young!r}, {_number(poisson)}")
     return (*head, "*DENSITY", f"{material.density!r}")
 

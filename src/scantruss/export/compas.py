@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import FormatError
 from ..grid.panels import table_of
-from ..runtime.ours import MARK
+from ..runtime.ours import MADE_BY
 from .drawing_in import Drawing
 from .model import Model
 from .style import FileStyle
@@ -35,7 +35,7 @@ def encode_compas(model: Model, style: FileStyle) -> bytes:
         if model.truss is not None:
             values["section"] = model.truss.sections[model.truss.section_of[number]].name
         edges[str(start)][str(end)] = values
-    common = {"made_by": MARK, "unit": model.unit}
+    common = {"made_by": MADE_BY, "unit": model.unit}
     zero = {"x": 0.0, "y": 0.0, "z": 0.0}
     graph = {
         "attributes": common, "default_node_attributes": zero, "default_edge_attributes": {}, "node": nodes, "edge": edges,

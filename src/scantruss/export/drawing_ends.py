@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import FormatError
-from .drawing_panels import place_of
+from .drawing_panels import place_in_drawing
 
 
 def check_ends(lines: np.ndarray, points: np.ndarray, reach: float, near: float, name: str) -> None:
@@ -36,7 +36,7 @@ def check_ends(lines: np.ndarray, points: np.ndarray, reach: float, near: float,
     if len(apart):
         raise FormatError(
             f"{name} has {len(apart):,} pairs of ends within {near:.3g} of each other that are not joined, one at"
-            f" {place_of(points[apart[0, 0]])}; give a larger --merge than their distance, or draw them farther apart"
+            f" {place_in_drawing(points[apart[0, 0]])}; give a larger --merge than their distance, or draw them farther apart"
         )
     line, node = _beside(lines, points, tree, near)
     start, way = points[lines[line, 0]], points[lines[line, 1]] - points[lines[line, 0]]
@@ -47,7 +47,7 @@ def check_ends(lines: np.ndarray, points: np.ndarray, reach: float, near: float,
     if through.any():
         raise FormatError(
             f"{name} has {len(np.unique(line[through])):,} lines that run through nodes or past loose ends, one at"
-            f" {place_of(points[node[through][0]])}; split them there"
+            f" {place_in_drawing(points[node[through][0]])}; split them there"
         )
 
 

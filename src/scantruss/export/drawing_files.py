@@ -19,8 +19,8 @@ from .rhino import UNIT_SYSTEMS
 if TYPE_CHECKING:
     from ezdxf.entities import DXFEntity
 
-OURS = ("NODE", "SUPPORT")  #: blocks of our DXF files that are no members
-UNDRAWN = (
+OWN_BLOCKS = ("NODE", "SUPPORT")  #: blocks of our DXF files that are no members
+NO_MEMBERS = (
     "TEXT",
     "MTEXT",
     "POINT",
@@ -167,13 +167,13 @@ def _dxf_entity(entity: DXFEntity, found: DrawnParts, depth: int = 0) -> None:
         for face in made.faces:
             found.face([places[corner] for corner in face])
     elif kind == "INSERT" and depth < MOST_NESTED:
-        if made.dxf.name in OURS and made.has_attrib("MARK"):
-            found.nodes += [tuple(made.dxf.insert)] * (made.dxf.name == OURS[0])
+        if made.dxf.name in OWN_BLOCKS and made.has_attrib("MARK"):
+            found.nodes += [tuple(made.dxf.insert)] * (made.dxf.name == OWN_BLOCKS[0])
             return
         for copy in made.multi_insert() if made.mcount > 1 else (made,):
             for part in copy.virtual_entities():
                 _dxf_entity(part, found, depth + 1)
-    elif kind not in UNDRAWN:
+    elif kind not in NO_MEMBERS:
         found.other(kind)
 
 

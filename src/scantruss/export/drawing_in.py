@@ -21,13 +21,13 @@ from .drawing_panels import (
     TooManyCyclesError,
     lines_on_no_panel,
     panels_among_lines,
-    place_of,
+    place_in_drawing,
     sides_on_no_line,
     without_diagonals,
 )
 
-MERGE = 1e-3  #: distance within which ends are one node, in median lengths of lines
-FAR = 1e5  #: coordinates from which on nodes are kept relative to an origin [unit]
+MERGE_DISTANCE = 1e-3  #: distance within which ends are one node, in median lengths of lines
+FAR_FROM_ZERO = 1e5  #: coordinates from which on nodes are kept relative to an origin [unit]
 NEARLY_JOINED = 0.05  #: distance within which nodes that no line joins, and nodes and lines, are taken for badly drawn, in median lengths
 
 
@@ -75,15 +75,15 @@ def grid_of_drawing(drawing: Drawing, name: str, merge: float | None = None) -> 
     if not np.isfinite(drawing.points[pairs]).all():
         raise FormatError(f"{name} has an end that is not a number; export it again")
     median = float(np.median(np.linalg.norm(drawing.points[pairs[:, 1]] - drawing.points[pairs[:, 0]], axis=1)))
-    reach = MERGE * median if merge is None else merge
+    reach = MERGE_DISTANCE * median if merge is None else merge
     points, number = _merged(drawing, np.unique(pairs), reach)
     if (short := number[pairs[:, 0]] == number[pairs[:, 1]]).any():
-        where = place_of(drawing.points[pairs[short][0, 0]])
+        where = place_in_drawing(drawing.points[pairs[short][0, 0]])
         raise FormatError(
             f"{name} has {short.sum():,} lines or sides no longer than {reach:.3g}, one at {where}; use a smaller --merge"
         )
     lines = np.unique(np.sort(number[drawing.lines], axis=1), axis=0)
-    far = float(np.abs(points).max()) > FAR
+    far = float(np.abs(points).max()) > FAR_FROM_ZERO
     origin = np.round((points.min(axis=0) + points.max(axis=0)) / 2) if far else np.zeros(3)
     nodes = points - origin
     panels, how = _surface(drawing, lines, number, nodes, origin, name)
@@ -95,7 +95,7 @@ def grid_of_drawing(drawing: Drawing, name: str, merge: float | None = None) -> 
         grid = _framework(grid, members, name)
         if len(panels):
             how += f"; {len(loose):,} of its {len(lines):,} lines are on no panel, and members all the same, one at "
-            how += place_of(points[loose[0]].mean(axis=0))
+            how += place_in_drawing(points[loose[0]].mean(axis=0))
     return grid, (f"{name} has no certificate: it was compared with no scan{how}{drawing.left}",)
 
 
@@ -108,7 +108,9 @@ def _surface(
     except TooManyCyclesError as error:
         return np.zeros((0, 3), np.int64), f"; it has no panels, as loads on areas need: {error}"
     if twice := [loop for loop in loops_of(panels) if len(set(loop)) < len(loop)]:
-        raise FormatError(f"{name} has a face that meets itself at {place_of((nodes + origin)[twice[0][0]])}; split it")
+        raise FormatError(
+            f"{name} has a face that meets itself at {place_in_drawing((nodes + origin)[twice[0][0]])}; split it"
+        )
     if not len(panels):
         return panels, "; it has no panels, as loads on areas need"
     grid = _grid(nodes, panels, origin, drawing)
@@ -170,7 +172,7 @@ def _framework(grid: Grid, members: np.ndarray, name: str) -> Framework:
     corners = corners[(corners >= 0).all(axis=1)]
     across = corners[lines_on_no_panel(corners, table)]
     if len(wrong := np.delete(members, lines_on_no_panel(members, across), axis=0)):
-        where = place_of((grid.nodes + grid.origin)[wrong[0]].mean(axis=0))
+        where = place_in_drawing((grid.nodes + grid.origin)[wrong[0]].mean(axis=0))
         raise FormatError(f"{name} has lines across its faces, one at {where}; draw what they divide as faces")
     return Framework(
         nodes=grid.nodes,

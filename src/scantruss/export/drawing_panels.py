@@ -15,7 +15,7 @@ class TooManyCyclesError(FormatError):
     """Lines that may enclose other panels just as well, so that none are taken."""
 
 
-def place_of(point: np.ndarray) -> str:
+def place_in_drawing(point: np.ndarray) -> str:
     """Return a place in words."""
     return ", ".join(f"{value:.6g}" for value in point)
 
@@ -134,7 +134,7 @@ def _between_none(panels: np.ndarray, lines: np.ndarray, points: np.ndarray, nam
     taken_twice = sides[between[owner]]
     wrong = np.concatenate([np.flatnonzero(left > 2), taken_twice[left[taken_twice] < 2]])
     if wrong.size:
-        where = place_of(points[lines[wrong[0]]].mean(axis=0))
+        where = place_in_drawing(points[lines[wrong[0]]].mean(axis=0))
         raise TooManyCyclesError(
             f"{name} has lines with more than two cycles of three or four lines, one at {where}; export its panels as faces"
         )

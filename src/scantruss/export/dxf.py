@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..runtime.ours import MARK
+from ..runtime.ours import MADE_BY
 from .bodies import bodies_of
 from .model import Model
 from .style import FileStyle
@@ -61,7 +61,7 @@ def encode_dxf(model: Model, style: FileStyle) -> bytes:
     finally:
         options.write_fixed_meta_data_for_testing = kept
     head, mark, tail = text.getvalue().partition("SECTION\n  2\nENTITIES\n")
-    return "".join([f"999\n{MARK}\n", head, mark, *entities.lines, tail]).encode("utf-8", "replace")
+    return "".join([f"999\n{MADE_BY}\n", head, mark, *entities.lines, tail]).encode("utf-8", "replace")
 
 
 class _Entities:

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 MARK_WIDTH = 1.1  # width of a mark over the radius of its ball
-TALLEST = 0.6  # height of letters over the radius of the ball
-DEPTH = 0.08  # of the engraving where it is least deep, over the radius of the ball
+LETTER_HEIGHT = 0.6  # height of letters over the radius of the ball
+ENGRAVING_DEPTH = 0.08  # of the engraving where it is least deep, over the radius of the ball
 TALL_ON_MEMBER = 0.9  # greatest height of letters over the radius of the member
 ROOM_TAKEN = 0.8  # greatest share of the clear length that a mark takes
 DEPTH_ON_MEMBER = 0.15  # of the engraving where it is least deep, over the radius of the member
@@ -35,9 +35,9 @@ def engraved(ball: Any, radius: float, text: str, normal: np.ndarray) -> Any:
 
     outlines = _letters(text)
     wide = 2 * max(float(np.abs(each[:, 0]).max()) for each in outlines)
-    height = radius * min(MARK_WIDTH / wide, TALLEST)
+    height = radius * min(MARK_WIDTH / wide, LETTER_HEIGHT)
     reach = height * max(float(np.linalg.norm(each, axis=1).max()) for each in outlines)
-    floor = float(np.sqrt(radius**2 - reach**2)) - DEPTH * radius
+    floor = float(np.sqrt(radius**2 - reach**2)) - ENGRAVING_DEPTH * radius
     flat = CrossSection([(each * height).tolist() for each in outlines], FillRule.EvenOdd)
     letters = Manifold.extrude(flat, 2 * radius - floor).translate((0.0, 0.0, floor))
     up = np.array([0.0, 1.0, 0.0] if abs(normal[2]) > 0.5 else [0.0, 0.0, 1.0])
@@ -78,4 +78,4 @@ def engraved_member(
 def letter_height(text: str, radius: float) -> float:
     """Return how high the letters of a text on a ball are."""
     wide = 2 * max(float(np.abs(each[:, 0]).max()) for each in _letters(text))
-    return radius * min(MARK_WIDTH / wide, TALLEST)
+    return radius * min(MARK_WIDTH / wide, LETTER_HEIGHT)

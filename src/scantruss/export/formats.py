@@ -165,7 +165,7 @@ def check_output(path: str | Path, kind: str = GRID, also: tuple[str, ...] = ())
     return path
 
 
-def check_unit(path: Path, unit: str) -> None:
+def check_model_unit(path: Path, unit: str) -> None:
     """Refuse a format that needs a unit, of a grid that has none; called as soon as that is known.
 
     Raises
@@ -264,7 +264,7 @@ def write(
         raise FormatError(f"write needs a grid or structure, then a file name, got {type(path).__name__} as the file")
     model = model_of(what, cloud=cloud, report=report)
     path = check_output(path, GRID if model.truss is None else STRUCTURE)
-    check_unit(path, model.unit)
+    check_model_unit(path, model.unit)
     encode = FORMATS[suffix_of(path, suffixes_of())].encode
     assert encode is not None  # `check_output` knows only formats that are written
     with nothing_collected():

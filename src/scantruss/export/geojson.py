@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..runtime.ours import MARK
+from ..runtime.ours import MADE_BY
 from .dxf import held_words
 from .model import Model
 from .style import FileStyle
@@ -24,7 +24,7 @@ def encode_geojson(model: Model, style: FileStyle) -> bytes:
     """Return a collection of features, each a line; heights are the third coordinates."""
     code = model.system.removeprefix("EPSG:") if model.system.startswith("EPSG:") else ""
     system = {"type": "name", "properties": {"name": URN + code}} if code else None
-    head = {"type": "FeatureCollection", "name": "grid" if model.truss is None else "structure", "made_by": MARK,
+    head = {"type": "FeatureCollection", "name": "grid" if model.truss is None else "structure", "made_by": MADE_BY,
             "crs": system, "reference_system": model.system, "unit": model.unit}  # fmt: skip
     places = [f"[{x!r}, {y!r}, {z!r}]" for x, y, z in model.nodes.tolist()]
     nodes, members, panels = (list(map(_quoted, m)) for m in (model.node_marks, model.member_marks, model.panel_marks))

@@ -10,17 +10,18 @@ from typing import Any
 
 import numpy as np
 
-from ..runtime.ours import MARK
+from ..runtime.ours import MADE_BY
 from .bodies import bodies_of, member_axes
 from .model import Model
 from .style import FileStyle
 
-SIDES = 8  #: of a tube
+SIDES_OF_TUBE = 8  #: of a tube
 SCAN_POINTS = 200_000  #: of the scan
 TUBE_SYMBOL = 1 / 60  #: radius of a member without section, in mean member lengths
 Y_UP = [-(0.5**0.5), 0.0, 0.0, 0.5**0.5]  #: quaternion that turns z up into y up
-STEEL, PANEL, BALL, SCAN = (0.55, 0.6, 0.66, 1.0), (0.75, 0.82, 0.9, 0.45), (0.25, 0.27, 0.3, 1.0), (0.1, 0.1, 0.1, 1.0)
-RAMP = np.array(
+STEEL_COLOUR, PANEL_COLOUR = (0.55, 0.6, 0.66, 1.0), (0.75, 0.82, 0.9, 0.45)
+BALL_COLOUR, SCAN_COLOUR = (0.25, 0.27, 0.3, 1.0), (0.1, 0.1, 0.1, 1.0)
+COLOUR_RAMP = np.array(
     [(38, 130, 142), (94, 201, 98), (253, 200, 37), (200, 30, 30)], float
 )  #: of utilization 0, 1/3, 2/3, 1 and more
 FLOAT, UINT, BYTE = 5126, 5125, 5121  #: of glTF
@@ -84,24 +85,27 @@ def encode_glb(model: Model, style: FileStyle) -> bytes:
         meshes.append({"name": name, "primitives": [part]})
 
     places, normals, triangles = _tubes(nodes, model.members, radii, axes)
-    more, colour = {"NORMAL": buffer.add(normals.astype("<f4"), FLOAT, "VEC3", 34962)} if len(normals) else {}, STEEL
+    more, colour = (
+        {"NORMAL": buffer.add(normals.astype("<f4"), FLOAT, "VEC3", 34962)} if len(normals) else {},
+        STEEL_COLOUR,
+    )
     if model.utilization is not None and len(normals):
-        shades = np.repeat(linear(colours_of(model.utilization)), 2 * SIDES, axis=0)
+        shades = np.repeat(linear(colours_of(model.utilization)), 2 * SIDES_OF_TUBE, axis=0)
         more["COLOR_0"] = buffer.add(shades, BYTE, "VEC4", 34962, normalized=True)
         colour = (1.0, 1.0, 1.0, 1.0)
     mesh("members", places, colour, triangles, **more)
     if ball:
         mesh("nodes", *_balls(nodes, ball))
-    mesh("panels", nodes, PANEL, model.triangles)
+    mesh("panels", nodes, PANEL_COLOUR, model.triangles)
     if model.cloud is not None:
         points = model.cloud.points[:: -(-len(model.cloud.points) // SCAN_POINTS)]
-        mesh("scan", (points + (model.cloud.origin - model.origin)) * metres, SCAN, None)
+        mesh("scan", (points + (model.cloud.origin - model.origin)) * metres, SCAN_COLOUR, None)
     about = {"origin": (model.origin * metres).tolist(), "unit": "m", "unit of the grid": model.unit}
     root = {"name": "ScanTruss", "rotation": Y_UP, "children": list(range(1, len(meshes) + 1)), "extras": about}
     if not meshes:
         del root["children"]
     content = {
-        "asset": {"version": "2.0", "generator": MARK},
+        "asset": {"version": "2.0", "generator": MADE_BY},
         "scene": 0,
         "scenes": [{"nodes": [0]}],
         "nodes": [root, *({"name": each["name"], "mesh": k} for k, each in enumerate(meshes))],
@@ -116,9 +120,9 @@ def encode_glb(model: Model, style: FileStyle) -> bytes:
 
 def colours_of(utilization: np.ndarray) -> np.ndarray:
     """Return the (M, 4) colours of utilizations, red from 1 on; grey where there is none."""
-    share = np.clip(np.nan_to_num(utilization), 0.0, 1.0) * (len(RAMP) - 1)
-    low = np.minimum(share.astype(int), len(RAMP) - 2)
-    shades = RAMP[low] + (RAMP[low + 1] - RAMP[low]) * (share - low)[:, None]
+    share = np.clip(np.nan_to_num(utilization), 0.0, 1.0) * (len(COLOUR_RAMP) - 1)
+    low = np.minimum(share.astype(int), len(COLOUR_RAMP) - 2)
+    shades = COLOUR_RAMP[low] + (COLOUR_RAMP[low + 1] - COLOUR_RAMP[low]) * (share - low)[:, None]
     shades[np.isnan(utilization)] = 128.0
     return np.column_stack([shades.round(), np.full(len(shades), 255.0)]).astype(np.uint8)
 
@@ -139,12 +143,17 @@ def _tubes(
     nodes: np.ndarray, members: np.ndarray, radii: np.ndarray, axes: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return places, normals and triangles of open tubes around the members, two rings each."""
-    angle = 2 * np.pi * np.arange(SIDES) / SIDES
+    angle = 2 * np.pi * np.arange(SIDES_OF_TUBE) / SIDES_OF_TUBE
     normals = axes[:, None, 1] * np.cos(angle)[:, None] + axes[:, None, 2] * np.sin(angle)[:, None]
     rings = nodes[members][:, :, None] + (radii[:, None, None] * normals)[:, None]
-    here, there = np.arange(SIDES), (np.arange(SIDES) + 1) % SIDES
-    one = np.concatenate([np.stack([here, there, here + SIDES], 1), np.stack([there, there + SIDES, here + SIDES], 1)])
-    triangles = one + 2 * SIDES * np.arange(len(members))[:, None, None]
+    here, there = np.arange(SIDES_OF_TUBE), (np.arange(SIDES_OF_TUBE) + 1) % SIDES_OF_TUBE
+    one = np.concatenate(
+        [
+            np.stack([here, there, here + SIDES_OF_TUBE], 1),
+            np.stack([there, there + SIDES_OF_TUBE, here + SIDES_OF_TUBE], 1),
+        ]
+    )
+    triangles = one + 2 * SIDES_OF_TUBE * np.arange(len(members))[:, None, None]
     return rings.reshape(-1, 3), np.repeat(normals, 2, axis=0).reshape(-1, 3), triangles.reshape(-1, 3)
 
 
@@ -162,4 +171,4 @@ def _balls(nodes: np.ndarray, radius: float) -> tuple[np.ndarray, tuple[float, .
         ab, bc, ca = (number[min(pair), max(pair)] for pair in ((a, b), (b, c), (c, a)))
         small += [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
     triangles = np.array(small) + len(places) * np.arange(len(nodes))[:, None, None]
-    return (nodes[:, None] + radius * places).reshape(-1, 3), BALL, triangles.reshape(-1, 3)
+    return (nodes[:, None] + radius * places).reshape(-1, 3), BALL_COLOUR, triangles.reshape(-1, 3)

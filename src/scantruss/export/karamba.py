@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import FormatError
-from ..runtime.ours import MARK
+from ..runtime.ours import MADE_BY
 from .model import Model, line_loads, temperatures
 from .style import FileStyle
 
@@ -32,7 +32,7 @@ def encode_karamba(model: Model, style: FileStyle) -> bytes:
     }
     if model.truss is not None:
         lists |= _structure(model)
-    head = {"format": "karamba-plain", "made_by": MARK, "length": model.unit, "force": "kN"}
+    head = {"format": "karamba-plain", "made_by": MADE_BY, "length": model.unit, "force": "kN"}
     parts = [f"{json.dumps(key)}: {json.dumps(value)}" for key, value in head.items()]
     parts += ["{}: [\n{}\n]".format(json.dumps(key), ",\n".join(rows)) for key, rows in lists.items()]
     return ("{\n" + ",\n".join(parts) + "\n}\n").encode("utf-8")

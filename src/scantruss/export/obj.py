@@ -7,7 +7,7 @@ import numpy as np
 from .. import __version__
 from ..grid.grid import Grid
 
-FAILED = "failed its certificate: it "  #: line of a file whose grid failed, before what is wrong with it
+FAILED_LINE = "failed its certificate: it "  #: line of a file whose grid failed, before what is wrong with it
 GRID_KINDS = {"triangle": "triangular", "quad": "quadrangular", "hexagon": "hexagonal"}  # of a grid truss, by its cells
 
 
@@ -22,7 +22,7 @@ def header_lines(grid: Grid) -> list[str]:
         longest = "" if grid.desired is None else f" to {float(np.max(grid.desired, initial=0.0))!r}"
         lines.insert(2, f"desired member length: {float(grid.settings.length)!r}{longest}")
     if grid.certificate is not None and not grid.certificate.passed:
-        lines.insert(1, FAILED + " and ".join(fault.words for fault in grid.certificate.faults))
+        lines.insert(1, FAILED_LINE + " and ".join(fault.words for fault in grid.certificate.faults))
     return lines
 
 

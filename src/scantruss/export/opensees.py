@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import FormatError
-from ..runtime.ours import MARK
+from ..runtime.ours import MADE_BY
 from .model import Model, line_loads, nodal_loads
 from .style import FileStyle
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from ..structure.truss import LoadCase, Truss
 
 Command = tuple[Any, ...]  # a name and its values; of many alike each value is a column: a list, or one for all
-RIGID = 1e5  #: stiffness of a rigid part of a spring joint, times the bending or torsional stiffness of the member
+RIGID_PART = 1e5  #: stiffness of a rigid part of a spring joint, times the bending or torsional stiffness of the member
 
 TCL_RUN = """
 proc solve {} {
@@ -119,7 +119,7 @@ def _plain(words: str) -> str:
 def _head(truss: Truss) -> list[str]:
     """Return what a reader of the script should know."""
     comments = [
-        MARK,
+        MADE_BY,
         "units: m, N, kg; nodes and members are counted from 1, in the order of their marks; local z lies along the normal",
         *(f"load case {number}: {_plain(case.name)}" for number, case in enumerate(truss.cases, 1)),
     ]
@@ -240,7 +240,7 @@ def _members(model: Model, truss: Truss, made: list[Command], extra: _Extra) -> 
     both, lengths = (truss.members + 1).tolist(), truss.lengths
     for member in np.flatnonzero(springy.any(axis=1)).tolist():
         own, ends, frame = truss.sections[sections[member]], both[member], axes[member].tolist()
-        rigid = RIGID * material.young * max(own.inertia_y, own.inertia_z, own.torsion) / float(lengths[member])
+        rigid = RIGID_PART * material.young * max(own.inertia_y, own.inertia_z, own.torsion) / float(lengths[member])
         for which in np.flatnonzero(springy[member]).tolist():
             joint = ends[which]
             ends[which] = extra.node(model.nodes[joint - 1].tolist())

@@ -17,7 +17,7 @@ import numpy as np
 from ..errors import words_of_number
 from ..grid.certificate import near
 from ..grid.grid import Grid
-from ..runtime.ours import MARK
+from ..runtime.ours import MADE_BY
 from ..scan.checks import usual_extent
 from ..scan.cloud import PointCloud
 from ..structure.checks import use_words
@@ -76,12 +76,12 @@ def encode_page(model: Model, style: FileStyle) -> bytes:
         _settings(model),
         '<details><summary>Keys and gestures</summary><p class="note">Drag: turn. Shift or right button and drag, or two'
         " fingers: move. Wheel, pinch, + and -: nearer, farther. Arrows: turn, with shift: move. Home: all of it."
-        f' Escape: nothing selected.</p></details><p class="note">{MARK}</p>',
+        f' Escape: nothing selected.</p></details><p class="note">{MADE_BY}</p>',
     ]
     text = json.dumps(data, allow_nan=False, ensure_ascii=False, separators=(",", ":")).replace("<", "\\u003c")
     return "\n".join(
         [
-            f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8">\n<meta name="generator" content="{MARK}">',
+            f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8">\n<meta name="generator" content="{MADE_BY}">',
             f'<meta name="viewport" content="width=device-width, initial-scale=1"><title>{escape(title)}</title>',
             f"<style>\n{_own('page.css')}</style></head><body>",
             f'<main id="view"><canvas id="canvas" tabindex="0" role="img" aria-label="3D view of the {what}"></canvas>',

@@ -15,7 +15,7 @@ from ..grid.certificate import Certificate
 from ..grid.grid import Grid
 from ..grid.panels import planarity_of, shape_qualities_of, side_lengths_of
 from ..layouts.kinds import families_of_grid, kinds_of_grid
-from .drawing.structure import OVERUSED
+from .drawing.structure import OVERUSED_COLOUR
 from .model import Model
 
 OFF_PLANE = "off its plane / diagonal"  # name of a column of panels
@@ -49,7 +49,7 @@ class PageColumn(NamedTuple):
 Tables = dict[str, list[PageColumn]]
 
 
-def column(name: str, unit: str, values: Iterable[Any] | np.ndarray, digits: int = COLUMN_DIGITS) -> PageColumn:
+def page_column(name: str, unit: str, values: Iterable[Any] | np.ndarray, digits: int = COLUMN_DIGITS) -> PageColumn:
     """Return a column of plain values; NaN becomes None, and numbers keep so many digits."""
     plain = values.tolist() if isinstance(values, np.ndarray) else list(values)
     if not any(isinstance(value, float) for value in plain):
@@ -81,29 +81,29 @@ def tables_of(model: Model, made_of: Grid | None = None) -> Tables:
     """
     unit, ends, corners = model.unit, model.members, model.panels
     valence = np.bincount(ends.ravel(), minlength=len(model.local))
-    nodes = [column("node", "", model.node_marks)]
+    nodes = [page_column("node", "", model.node_marks)]
     digits = digits_of_places(model.nodes)
-    nodes += [column(axis, unit, model.nodes[:, k], digits) for k, axis in enumerate("xyz")]
-    nodes.append(column("members", "", valence))
+    nodes += [page_column(axis, unit, model.nodes[:, k], digits) for k, axis in enumerate("xyz")]
+    nodes.append(page_column("members", "", valence))
     members = [
-        column("member", "", model.member_marks),
-        *(column(name, "", _marks(model, ends[:, k])) for k, name in enumerate(("start", "end"))),
-        column("group", "", [model.groups[k] for k in model.group_of.tolist()]),
-        column("length", unit, model.lengths),
+        page_column("member", "", model.member_marks),
+        *(page_column(name, "", _marks(model, ends[:, k])) for k, name in enumerate(("start", "end"))),
+        page_column("group", "", [model.groups[k] for k in model.group_of.tolist()]),
+        page_column("length", unit, model.lengths),
     ]
     sides, width = side_lengths_of(model.local, corners), range(corners.shape[1])
     marks = [*model.node_marks, ""]
     panels = [
-        column("panel", "", model.panel_marks),
-        *(column(f"node {k + 1}", "", [marks[v] for v in corners[:, k].tolist()]) for k in width),
-        *(column(f"side {k + 1}", unit, sides[:, k]) for k in width),
-        column("quality", "", shape_qualities_of(model.local, corners)),
+        page_column("panel", "", model.panel_marks),
+        *(page_column(f"node {k + 1}", "", [marks[v] for v in corners[:, k].tolist()]) for k in width),
+        *(page_column(f"side {k + 1}", unit, sides[:, k]) for k in width),
+        page_column("quality", "", shape_qualities_of(model.local, corners)),
     ]
     if corners.shape[1] > 3:
-        panels.append(column(OFF_PLANE, "", planarity_of(model.local, corners)))
+        panels.append(page_column(OFF_PLANE, "", planarity_of(model.local, corners)))
     if model.truss is not None:
         held = np.isin(np.arange(len(model.local)), model.supported)
-        nodes.append(column("support", "", ["yes" if each else "no" for each in held.tolist()]))
+        nodes.append(page_column("support", "", ["yes" if each else "no" for each in held.tolist()]))
         members += _of_structure(model)
     grid = model.grid if model.truss is None else made_of
     if grid is not None and np.array_equal(np.sort(grid.edges), np.sort(model.members)):
@@ -132,20 +132,20 @@ def _marks(model: Model, ids: np.ndarray) -> list[str]:
 
 def _of_grid(grid: Grid) -> list[PageColumn]:
     """Return what is known of the nodes of a grid alone."""
-    columns = [column("fixed", "", ["yes" if each else "no" for each in grid.fixed.tolist()])]
+    columns = [page_column("fixed", "", ["yes" if each else "no" for each in grid.fixed.tolist()])]
     if grid.deviation is not None:
-        columns.append(column("distance from scan", grid.unit, grid.deviation))
+        columns.append(page_column("distance from scan", grid.unit, grid.deviation))
     return columns
 
 
 def _members_of_grid(grid: Grid) -> list[PageColumn]:
     """Return what is known of the members of a grid alone."""
-    columns = [column("fold", "degree", fold_angles(grid))] if grid.topology.manifold else []
+    columns = [page_column("fold", "degree", fold_angles(grid))] if grid.topology.manifold else []
     if grid.desired is not None or grid.settings is not None:
         length = grid.settings.length if grid.settings is not None else 1.0
-        columns.insert(0, column("length / desired", "", grid.stretches(length)))
+        columns.insert(0, page_column("length / desired", "", grid.stretches(length)))
     if (families := families_of_grid(grid)) is not None:
-        columns.append(column("family", "", 1 + families[1]))
+        columns.append(page_column("family", "", 1 + families[1]))
     return columns
 
 
@@ -156,23 +156,23 @@ def _kinds_of_grid(grid: Grid, parts: str) -> list[PageColumn]:
         return []
     rank = np.argsort(np.argsort(-np.bincount(found.of[found.of >= 0]), kind="stable"), kind="stable")
     kinds = np.where(found.of >= 0, 1 + rank[found.of], -1).tolist()
-    return [column("kind", "", [each if each > 0 else None for each in kinds])]
+    return [page_column("kind", "", [each if each > 0 else None for each in kinds])]
 
 
 def _of_structure(model: Model) -> list[PageColumn]:
     """Return sections, forces and checks of the members of a structure."""
     truss, solution = model.truss, model.solution
     assert truss is not None
-    columns = [column("section", "", [truss.sections[k].name for k in truss.section_of.tolist()])]
+    columns = [page_column("section", "", [truss.sections[k].name for k in truss.section_of.tolist()])]
     if solution is not None:
         axial = np.stack([result.axial for result in solution.all_results()]) / 1000.0
         low, high = axial[:, :, 0].min(axis=0), axial[:, :, 1].max(axis=0)
-        columns += [column("force min", "kN", low), column("force max", "kN", high)]
-        columns.append(column("axial force", "kN", np.where(-low > high, low, high)))
+        columns += [page_column("force min", "kN", low), page_column("force max", "kN", high)]
+        columns.append(page_column("axial force", "kN", np.where(-low > high, low, high)))
     if model.utilization is not None:
-        columns.append(column("utilization", "", model.utilization))
+        columns.append(page_column("utilization", "", model.utilization))
     if model.report is not None and model.report.utilization is not None:
-        columns.append(column("governed by", "", model.report.governing))
+        columns.append(page_column("governed by", "", model.report.governing))
     return columns
 
 
@@ -184,7 +184,7 @@ def colorings_of(tables: Tables) -> list[dict[str, Any]]:
         if any(value is not None for value in values):
             more: dict[str, Any] = {} if middle is None else {"middle": middle}
             if name == "utilization":
-                more["most"] = [1.0, OVERUSED]  # what is more has a colour of its own, as in pictures
+                more["most"] = [1.0, OVERUSED_COLOUR]  # what is more has a colour of its own, as in pictures
             found.append({"kind": kind, "name": name, "words": words, **more})
     return found
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 from typing import Any
 from uuid import UUID
 
-from ..runtime.ours import MARK
+from ..runtime.ours import MADE_BY
 
 DIGITS = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz_$"  #: of identifiers in IFC
 NOT_PLAIN = re.compile(r"[^ -~]+")
@@ -39,7 +39,7 @@ class Part21:
     """
 
     def __init__(self, schema: str, view: str) -> None:
-        self._lines = [PART21_HEAD.format(view=quoted(view), mark=quoted(MARK), schema=quoted(schema))]
+        self._lines = [PART21_HEAD.format(view=quoted(view), mark=quoted(MADE_BY), schema=quoted(schema))]
 
     def add(self, name: str, *values: Any) -> Ref:
         """Add an instance and return its number; None is "$", a tuple or list is an aggregate."""

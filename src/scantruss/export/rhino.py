@@ -6,7 +6,7 @@ import base64
 import struct
 import zlib
 
-from ..runtime.ours import MARK
+from ..runtime.ours import MADE_BY
 from .dxf import DXF_COLOURS, held_words, layers_of_members
 from .model import Model
 from .style import FileStyle
@@ -25,7 +25,7 @@ def encode_3dm(model: Model, style: FileStyle) -> bytes:
     import rhino3dm
 
     file = rhino3dm.File3dm()
-    file.ApplicationName = MARK
+    file.ApplicationName = MADE_BY
     file.Settings.ModelUnitSystem = getattr(rhino3dm.UnitSystem, UNIT_SYSTEMS[model.unit])
     layers: dict[str, int] = {}
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import FormatError
-from ..runtime.ours import MARK
+from ..runtime.ours import MADE_BY
 from .model import Model, temperatures
 from .style import FileStyle
 
@@ -23,11 +23,12 @@ if TYPE_CHECKING:
 
 S2K_TYPES = {"steel": "Steel", "aluminium": "Aluminum"}  #: of materials; others are "Other"
 PATTERNS = {"permanent": "Dead", "snow": "Snow", "wind": "Wind", "temperature": "Temperature"}  #: others are "Live"
-VERTICAL = 1e-3  #: sine of the angle to z below which SAP2000 takes a member to be vertical
+VERTICAL_SINE = 1e-3  #: sine of the angle to z below which SAP2000 takes a member to be vertical
 S2K_FREEDOMS = ("U1", "U2", "U3", "R1", "R2", "R3")
 
 TableRow = dict[str, Any]  # field -> value
 TableColumns = dict[str, Any]  # field -> list with a value a row, or the value of all rows
+S2kTable = tuple[str, list[TableRow] | TableColumns]  # name and contents
 
 
 def encode_s2k(model: Model, style: FileStyle) -> bytes:
@@ -35,7 +36,7 @@ def encode_s2k(model: Model, style: FileStyle) -> bytes:
     truss = model.truss
     if truss is None:
         raise FormatError("SAP2000 holds structures; make one of the grid with scantruss structure")
-    lines = [f"$ {MARK}"]
+    lines = [f"$ {MADE_BY}"]
     last = ""
     for name, rows in _tables(model, truss):
         if rows and name != last:
@@ -75,7 +76,7 @@ def _quoted(word: str) -> str:
 def frame_angles(axes: np.ndarray) -> np.ndarray:
     """Return the angles (M,) [degrees] by which local axis 2 turns from its default to our z, of (M, 3, 3) local axes as rows."""
     x, z = axes[:, 0], axes[:, 2]
-    upright = np.hypot(x[:, 0], x[:, 1]) < VERTICAL
+    upright = np.hypot(x[:, 0], x[:, 1]) < VERTICAL_SINE
     reference = np.where(upright[:, None], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0])
     second = reference - (reference * x).sum(axis=1, keepdims=True) * x
     second /= np.linalg.norm(second, axis=1, keepdims=True)
@@ -84,11 +85,26 @@ def frame_angles(axes: np.ndarray) -> np.ndarray:
     return angles
 
 
-def _tables(model: Model, truss: Truss) -> Iterator[tuple[str, list[TableRow] | TableColumns]]:
+def _tables(model: Model, truss: Truss) -> Iterator[S2kTable]:
+    """Yield all tables, those of a name one after the other."""
+    marks, members = list(map(_quoted, truss.node_marks)), list(map(_quoted, truss.member_marks))
+    yield from _definitions(model, truss)
+    yield from _joints_and_frames(model, truss, marks, members)
+    yield from _supports(truss)
+    yield from _frame_assignments(model, truss, members)
+    loads: dict[str, list[TableColumns]] = {}
+    for case in truss.cases:
+        for name, columns in _loads(truss, case, marks, members):
+            loads.setdefault(name, []).append(columns)
+    yield from ((name, columns) for name, own in loads.items() for columns in own)
+    yield from _cases(truss)
+
+
+def _definitions(model: Model, truss: Truss) -> Iterator[S2kTable]:
+    """Yield what is defined before joints and frames: the material, sections, load patterns and groups."""
     from ..structure.truss import GRAVITY
 
     material = truss.material
-    marks, members = list(map(_quoted, truss.node_marks)), list(map(_quoted, truss.member_marks))
     turning = "No" if truss.pinned else "Yes"
     yield "PROGRAM CONTROL", [{"ProgramName": "SAP2000", "CurrUnits": "KN, m, C"}]
     yield (
@@ -133,6 +149,10 @@ def _tables(model: Model, truss: Truss) -> Iterator[tuple[str, list[TableRow] | 
         ],
     )
     yield "GROUPS 1 - DEFINITIONS", [{"GroupName": name} for name in model.groups]
+
+
+def _joints_and_frames(model: Model, truss: Truss, marks: list[str], members: list[str]) -> Iterator[S2kTable]:
+    """Yield the places of the joints, and the joints at the ends of the frames, by their quoted marks."""
     x, y, z = model.nodes.T.tolist()
     place = {
         "Joint": marks,
@@ -146,6 +166,10 @@ def _tables(model: Model, truss: Truss) -> Iterator[tuple[str, list[TableRow] | 
     yield "JOINT COORDINATES", place
     start, end = ([marks[k] for k in ends] for ends in truss.members.T.tolist())
     yield "CONNECTIVITY - FRAME", {"Frame": members, "JointI": start, "JointJ": end, "IsCurved": "No"}
+
+
+def _supports(truss: Truss) -> Iterator[S2kTable]:
+    """Yield what holds joints: restraints and springs."""
     held = truss.supports[:, :3] if truss.pinned else truss.supports
     yield "JOINT RESTRAINT ASSIGNMENTS", [
         {"Joint": truss.node_marks[node]}
@@ -161,6 +185,10 @@ def _tables(model: Model, truss: Truss) -> Iterator[tuple[str, list[TableRow] | 
             for node in np.flatnonzero(springs.any(axis=1)).tolist()
         ],
     )
+
+
+def _frame_assignments(model: Model, truss: Truss, members: list[str]) -> Iterator[S2kTable]:
+    """Yield what each frame has, by the quoted marks: section, local axes, releases, group."""
     names = [_quoted(each.name) for each in truss.sections]
     sections = [names[k] for k in truss.section_of.tolist()]
     yield (
@@ -177,11 +205,10 @@ def _tables(model: Model, truss: Truss) -> Iterator[tuple[str, list[TableRow] | 
     groups = [_quoted(name) for name in model.groups]
     grouped = [groups[k] for k in model.group_of.tolist()]
     yield "GROUPS 2 - ASSIGNMENTS", {"GroupName": grouped, "ObjectType": "Frame", "ObjectLabel": members}
-    loads: dict[str, list[TableColumns]] = {}
-    for case in truss.cases:
-        for name, columns in _loads(truss, case, marks, members):
-            loads.setdefault(name, []).append(columns)
-    yield from ((name, columns) for name, own in loads.items() for columns in own)
+
+
+def _cases(truss: Truss) -> Iterator[S2kTable]:
+    """Yield load cases and combinations."""
     yield (
         "LOAD CASE DEFINITIONS",
         [

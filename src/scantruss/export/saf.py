@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import FormatError
-from ..runtime.ours import MARK
+from ..runtime.ours import MADE_BY
 from .model import STATIONS_WRITTEN, Model, line_loads, temperatures
 from .style import FileStyle
 from .workbook import ROWS_OF_SHEET, encode_workbook
@@ -156,7 +156,7 @@ def _model(model: Model) -> list[tuple[str, str]]:
     return [
         ("Discipline", "Load-bearing structure"),
         ("Source type", "Structural analysis model"),
-        ("Source application", MARK),
+        ("Source application", MADE_BY),
         ("SAF Version", SAF_VERSION),
         ("Global coordinate system", "Z vertical"),
         ("LCS of cross-section", "ZYX"),

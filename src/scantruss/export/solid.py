@@ -20,7 +20,7 @@ from .engraving import engraved, engraved_member
 from .solid_files import Solid, encode_3mf, encode_stl
 
 SUFFIXES = (".3mf", ".stl")
-SLENDEREST = 2_000  #: largest length of a member, in diameters, that can be printed
+SLENDEREST_PRINTED = 2_000  #: largest length of a member, in diameters, that can be printed
 MARKED_SIDES = 32  #: of balls with marks
 PARTS_PER_UNION = 64  #: parts joined at a time; joining blocks of neighbours first is quicker than all at once
 
@@ -155,10 +155,10 @@ def check_diameters(grid: Grid, member_diameter: float, node_diameter: float, sc
         )
     shortest = int(np.argmin(grid.lengths))
     length = float(grid.lengths[shortest]) * scale
-    if member_diameter < length / SLENDEREST:
+    if member_diameter < length / SLENDEREST_PRINTED:
         raise InputError(
             f"members {words_of_number(length, 4)}{unit} long at scale {scale:g} would be {member_diameter:g}{unit} thick,"
-            f" thinner than one in {SLENDEREST:,}; give a smaller scale or a larger diameter"
+            f" thinner than one in {SLENDEREST_PRINTED:,}; give a smaller scale or a larger diameter"
         )
     for name, value in (("member", member_diameter), ("node", node_diameter)):
         if value >= length:

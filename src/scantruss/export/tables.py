@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..runtime.ours import MARK
+from ..runtime.ours import MADE_BY
 from .model import Model
 from .style import FileStyle
 from .workbook import encode_workbook
@@ -38,7 +38,7 @@ def encode_xlsx_model(model: Model, style: FileStyle) -> bytes:
 
 def _model_sheet(model: Model) -> list[SheetRow]:
     rows: list[SheetRow] = [
-        ("made by", MARK),
+        ("made by", MADE_BY),
         ("unit", model.unit or "not known"),
         ("reference system", model.system or "not known"),
         *((f"origin {axis}", value) for axis, value in zip("xyz", model.origin.tolist(), strict=True)),

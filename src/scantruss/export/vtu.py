@@ -8,7 +8,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from ..runtime.ours import MARK
+from ..runtime.ours import MADE_BY
 from .model import Model
 from .style import FileStyle
 from .workbook import NOT_IN_XML
@@ -38,7 +38,7 @@ def encode_vtu(model: Model, style: FileStyle) -> bytes:
         "length": _of_members(model, model.lengths),
     }
     comments = [
-        MARK,
+        MADE_BY,
         f"unit: {model.unit or 'not known'}",
         "group: " + ", ".join(f"{k} {n}" for k, n in enumerate(model.groups)),
     ]

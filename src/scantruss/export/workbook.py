@@ -10,7 +10,7 @@ from typing import Any
 from xml.sax.saxutils import escape, quoteattr
 
 from ..errors import FormatError
-from ..runtime.ours import MARK
+from ..runtime.ours import MADE_BY
 
 ROWS_OF_SHEET = 1_048_576  # most rows of a sheet
 NO_DATE = (1980, 1, 1, 0, 0, 0)  # the earliest that a zip file can hold
@@ -43,7 +43,7 @@ WORKBOOK_RELATIONS = f"""{XML_HEAD}<Relationships xmlns="{NAMESPACE}/package/200
 </Relationships>
 """
 CORE = f"""{XML_HEAD}<cp:coreProperties xmlns:cp="{NAMESPACE}/package/2006/metadata/core-properties" \
-xmlns:dc="http://purl.org/dc/elements/1.1/"><dc:creator>{MARK}</dc:creator></cp:coreProperties>
+xmlns:dc="http://purl.org/dc/elements/1.1/"><dc:creator>{MADE_BY}</dc:creator></cp:coreProperties>
 """
 STYLES = f"""{XML_HEAD}<styleSheet xmlns="{NAMESPACE}/spreadsheetml/2006/main">
 <fonts count="1"><font><sz val="11"/><name val="Calibri"/></font></fonts>

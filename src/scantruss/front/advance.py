@@ -17,6 +17,7 @@ from ..kernels.front.candidate_nodes import CandidateNodes
 from ..runtime.progress import Progress, seer_of
 from ..runtime.watch import Watch
 from ..settings import Settings
+from ..surface.pieces import TRIANGLE_AREA
 from ..surface.samples import SurfaceSamples
 from .start import grown, new_front, start_front
 
@@ -60,7 +61,7 @@ def advance_front(
         activate_waiting(front)
         by_cases = settings.method == "paper" and strict == STRICTNESS_OF_ROUNDS[0]  # Table 1, else by quality
         advance = kernels.advance_by_cases if by_cases else kernels.advance
-        front = run(front, samples, rules._replace(strict=strict), progress, advance)
+        front = run_in_slices(front, samples, rules._replace(strict=strict), progress, advance)
     close_gaps(front, samples, settings)
     return grid_of_front(front, members, samples, settings)
 
@@ -84,14 +85,14 @@ def rules_of(samples: SurfaceSamples, settings: Settings) -> lists.Rules:
 
 def activate_waiting(front: lists.Front) -> None:
     """Make the waiting segments of a front active again, in their order."""
-    count = int(front.count[lists.SEGMENTS])
+    count = int(front.counts.segments)
     for s in np.flatnonzero(front.state[:count] == lists.WAITING).tolist():
         lists.enqueue(front, s)
 
 
 def grid_of_front(front: lists.Front, members: np.ndarray, samples: SurfaceSamples, settings: Settings) -> Grid:
     """Return the triangles of a front as a grid; `members`: (M, 2) those of its lines, all of which must be there."""
-    triangles = front.triangles[: front.count[lists.TRIANGLES]]
+    triangles = front.triangles[: front.counts.triangles]
     check_kept(members, triangles, front.nodes + samples.origin)
     used, numbered = np.unique(triangles, return_inverse=True)
     desired = settings.length * samples.surface.field[front.sample[used]] if samples.graded else None
@@ -114,8 +115,8 @@ def close_gaps(front: lists.Front, samples: SurfaceSamples, settings: Settings) 
     Boundary loops that the front never reached are left out. Each turn takes the segments of one loop off the
     front, at least one, so it ends after no more turns than there are segments.
     """
-    loop = np.empty(int(front.count[lists.SEGMENTS]) + 1, np.int64)
-    for s in np.flatnonzero(front.state[: front.count[lists.SEGMENTS]] != lists.GONE).tolist():
+    loop = np.empty(int(front.counts.segments) + 1, np.int64)
+    for s in np.flatnonzero(front.state[: front.counts.segments] != lists.GONE).tolist():
         while front.state[s] != lists.GONE:
             count = gaps.gap_loop(front, s, loop)
             segments = loop[:count].copy()
@@ -125,24 +126,24 @@ def close_gaps(front: lists.Front, samples: SurfaceSamples, settings: Settings) 
                 gaps.cut_out(front, segments)
 
 
-def run(
+def run_in_slices(
     front: lists.Front, samples: SurfaceSamples, rules: lists.Rules, progress: Progress | None, step: Callable[..., int]
 ) -> lists.Front:
     """Advance by slices of a kernel (`step`) until no active segment is left; arrays grow as needed."""
-    expected = samples.graded_area / (0.433 * rules.desired**2)
-    watch, made = Watch(RUNS_OVER_ITSELF, expected, MOST_TRIANGLES_MADE), int(front.count[lists.TRIANGLES])
+    expected = samples.graded_area / (TRIANGLE_AREA * rules.desired**2)
+    watch, made = Watch(RUNS_OVER_ITSELF, expected, MOST_TRIANGLES_MADE), int(front.counts.triangles)
     watch.note(made, samples.origin)
     see = seer_of(progress)
     while True:  # each slice makes triangles, or the queue becomes shorter
         status = step(samples.surface, front, rules, SEGMENTS_PER_REPORT if see is None else SEGMENTS_PER_LOOK)
         if see is not None:
-            nodes, triangles = front.count[lists.NODES], front.count[lists.TRIANGLES]
+            nodes, triangles = front.counts.nodes, front.counts.triangles
             see(front.nodes[:nodes] + samples.origin, front.triangles[:triangles].copy())
         if progress:
-            progress("front", min(float(front.count[lists.TRIANGLES]) / max(expected, 1.0), 1.0))
+            progress("front", min(float(front.counts.triangles) / max(expected, 1.0), 1.0))
         if status == lists.DONE:
             return front
-        watch.note(int(front.count[lists.TRIANGLES]) - made, front.nodes[front.count[lists.NODES] - 1] + samples.origin)
-        made = int(front.count[lists.TRIANGLES])
+        watch.note(int(front.counts.triangles) - made, front.nodes[front.counts.nodes - 1] + samples.origin)
+        made = int(front.counts.triangles)
         if status == lists.FULL:
             front = grown(front)

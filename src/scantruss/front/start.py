@@ -17,9 +17,7 @@ from ..kernels.geometry.boxes import new_boxes
 from ..kernels.geometry.triangles import quality
 from ..kernels.mesh.point_location import nearest_sample
 from ..kernels.surface.local_surface import (
-    NEAREST_SAMPLE,
-    NORMAL,
-    PATCH_COLUMNS,
+    SURFACE_PATCH,
     Surface,
     fit_patch,
     onto_patch,
@@ -27,7 +25,9 @@ from ..kernels.surface.local_surface import (
     walk,
 )
 from ..kernels.surface.ridges import mean_normal
+from ..runtime.jit import new_record
 from ..settings import Settings
+from ..surface.pieces import TRIANGLE_AREA
 from ..surface.samples import SurfaceSamples, local_field
 from .orientation_field import nodes_at
 
@@ -36,24 +36,30 @@ FIXED_CLEARANCE = 0.33  # least distance of a fixed position from the initial fr
 SIDE_REACH = 0.6  # how far the sides of a ridge are looked at [member lengths]
 # size d_B of the search boxes of the nodes (Eq. 1): as far as one step of the front looks [member lengths]
 NODE_BOX = 2.4
+MORE_NODES = 2000  # nodes that there is room for at first beyond twice those of regular triangles
+# a seed of candidate nodes: how many of the nearest are tried, how far they may be [member lengths], how they must face, and how
+# good the triangle must be
+SEED_NODES, SEED_REACH, SEED_FACING, SEED_QUALITY = 12, 2.0, 0.5, 0.8
 
 
 def new_front(samples: SurfaceSamples, settings: Settings) -> lists.Front:
     """Return an empty front with room for the cloud."""
-    mean, room = samples.surface.mean, int(2.0 * samples.graded_area / (0.433 * settings.length**2)) + 2000
+    mean = samples.surface.mean
+    room = int(2.0 * samples.graded_area / (TRIANGLE_AREA * settings.length**2)) + MORE_NODES
     usual = settings.length * float(np.sqrt(samples.area / samples.graded_area))
     boxes = new_boxes(mean.min(axis=0), mean.max(axis=0), NODE_BOX * usual, room, room)
-    return _blank(room, boxes)
+    return _blank(room, settings.sharp_edges, boxes)
 
 
-def _blank(room: int, boxes: boxing.SearchBoxes) -> lists.Front:
+def _blank(room: int, sharp_edges: bool, boxes: boxing.SearchBoxes) -> lists.Front:
     def ids(*shape: int) -> np.ndarray:
         return np.full(shape, -1, np.int64)
 
     return lists.Front(
         np.zeros((room, 3)), np.zeros((room, 3)), ids(room), np.zeros(room, np.bool_), ids(room),
         ids(4 * room), ids(4 * room), ids(4 * room), ids(4 * room), np.zeros(4 * room, np.int64), ids(4 * room),
-        ids(2 * room, 3), ids(room), ids(6 * room), ids(4 * room), np.zeros(8, np.int64), boxes,
+        ids(2 * room, 3), ids(room), ids(6 * room), ids(4 * room),
+        new_record(lists.FRONT_COUNTS), sharp_edges, boxes,
     )  # fmt: skip
 
 
@@ -62,15 +68,16 @@ def grown(front: lists.Front) -> lists.Front:
     old = front.boxes
     room = 2 * len(front.nodes)
     boxes = new_boxes(old.lower, old.lower + old.size * (old.counts - 1), float(old.size.max()), room, room)
-    larger = _blank(room, boxes)
-    for name in lists.Front._fields[:-3]:
+    larger = _blank(room, front.sharp_edges, boxes)
+    for name in lists.Front._fields[: lists.Front._fields.index("queue")]:
         kept = getattr(front, name)
         getattr(larger, name)[: len(kept)] = kept
-    waiting = front.queue[np.arange(front.count[lists.FIRST], front.count[lists.LAST]) % len(front.queue)]
+    waiting = front.queue[np.arange(front.counts.first, front.counts.last) % len(front.queue)]
     larger.queue[: len(waiting)] = waiting
-    larger.count[:] = front.count
-    larger.count[lists.FIRST], larger.count[lists.LAST] = 0, len(waiting)
-    for n in range(int(front.count[lists.NODES])):
+    for name in ("nodes", "segments", "triangles"):
+        larger.counts[name] = front.counts[name]
+    larger.counts.last = len(waiting)
+    for n in range(int(front.counts.nodes)):
         if front.sample[n] >= 0:  # the others were merged away
             boxing.put(boxes, n, *larger.nodes[n])
     return larger
@@ -86,7 +93,6 @@ def start_front(
 ) -> lists.Front:
     """Fill the lists with the initial front: boundary loops, lines, candidate nodes, a seed triangle on closed pieces."""
     surface = samples.surface
-    front.count[lists.LOOK_AT_EDGES] = int(settings.sharp_edges)
     for loop in boundary.loops:
         active = loop.external or loop.cut != "" or settings.advance_from == "all"
         nodes, _ = characteristic_points(loop, settings.length)
@@ -112,7 +118,7 @@ def start_front(
 
 def add_candidates(front: lists.Front, surface: Surface, nodes: CandidateNodes, clear: float) -> lists.Front:
     """Add candidate nodes to a front, which grows until there is room for them."""
-    while int(front.count[lists.NODES]) + len(nodes.places) + 2 > len(front.nodes):
+    while int(front.counts.nodes) + len(nodes.places) + 2 > len(front.nodes):
         front = grown(front)
     add_candidate_nodes(front, surface, nodes, clear)
     return front
@@ -122,7 +128,7 @@ def add_lines(front: lists.Front, surface: Surface, lines: Lines, settings: Sett
     """Add the lines to a front that holds the boundary loops."""
     if not lines.curves:
         return
-    count = int(front.count[lists.NODES])
+    count = int(front.counts.nodes)
     at_stop = {}
     for stop, place in enumerate(lines.stops):
         if lines.on_loop[stop] >= 0:
@@ -130,7 +136,7 @@ def add_lines(front: lists.Front, surface: Surface, lines: Lines, settings: Sett
         else:
             at_stop[stop] = add_nodes(front, surface, place[None])[0]
     node_stop = {node: stop for stop, node in at_stop.items()}
-    heads = front.head[: front.count[lists.SEGMENTS]].tolist()
+    heads = front.head[: front.counts.segments].tolist()
     curves = zip(front.tail[: len(heads)].tolist(), heads, strict=True)
     beside = ((node_stop[a], node_stop[b]) for a, b in curves if a in node_stop and b in node_stop)
     taken = {(min(pair), max(pair)) for pair in beside}
@@ -169,12 +175,15 @@ def add_seed(front: lists.Front, ids: list[int]) -> None:
 
 def seed_of_candidates(front: lists.Front, surface: Surface, sample: int, length: float) -> list[int]:
     """Return three candidate nodes near a sample that make a good triangle; none where there are no such three."""
-    count = int(front.count[lists.NODES])
+    count = int(front.counts.nodes)
     free = np.flatnonzero(front.out[:count] < 0)
     away = np.linalg.norm(front.nodes[free] - surface.mean[sample], axis=1)
-    near = free[np.argsort(away, kind="stable")[:12]]
-    near = near[(front.normals[near] @ surface.normals[sample] > 0.5) & (np.sort(away)[: len(near)] < 2.0 * length)]
-    best, ids = 0.8, []
+    near = free[np.argsort(away, kind="stable")[:SEED_NODES]]
+    near = near[
+        (front.normals[near] @ surface.normals[sample] > SEED_FACING)
+        & (np.sort(away)[: len(near)] < SEED_REACH * length)
+    ]
+    best, ids = SEED_QUALITY, []
     for a, b, c in combinations(near.tolist(), 3):
         pa, pb, pc = (tuple(front.nodes[q].tolist()) for q in (a, b, c))
         value = quality(pa, pb, pc, length, 0.5, 0.5)
@@ -186,10 +195,10 @@ def seed_of_candidates(front: lists.Front, surface: Surface, sample: int, length
 
 def new_seed(front: lists.Front, surface: Surface, sample: int, length: float) -> list[int]:
     """Add three nodes of a regular triangle around a sample."""
-    patch = np.zeros(PATCH_COLUMNS)
+    patch = new_record(SURFACE_PATCH)
     centre = surface.mean[sample]
     fit_patch(surface, patch, sample, tuple(centre))
-    normal = patch[NORMAL : NORMAL + 3].copy()
+    normal = patch.normal.copy()
     towards = surface.mean[surface.neighbors[sample, 0]] - centre
     u = towards - normal * (towards @ normal)
     u /= np.linalg.norm(u)
@@ -197,10 +206,10 @@ def new_seed(front: lists.Front, surface: Surface, sample: int, length: float) -
     ids = []
     for angle in np.radians([0.0, 120.0, 240.0]):
         place = centre + length / np.sqrt(3.0) * (np.cos(angle) * u + np.sin(angle) * v)
-        own = np.zeros(PATCH_COLUMNS)
+        own = new_record(SURFACE_PATCH)
         fit_patch(surface, own, sample, tuple(place))
         foot = onto_patch(own, tuple(place))
-        near = walk(surface, int(own[NEAREST_SAMPLE]), foot)
+        near = walk(surface, own.sample, foot)
         ids.append(lists.propose_node(front, foot, patch_normal(own, foot), near, False))
         lists.add_node(front)
     return ids

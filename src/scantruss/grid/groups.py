@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from .grid import Grid
 
 BOUNDARY, INNER = "boundary", "inner"  #: groups of members on no line
-FRAME = "frame"  #: group of members that are sides of no panel
+FRAME_MEMBERS = "frame"  #: group of members that are sides of no panel
 
 
 def member_groups(grid: Grid) -> list[str]:
@@ -20,5 +20,5 @@ def member_groups(grid: Grid) -> list[str]:
     for line in reversed(grid.line_sets):  # the first that holds both nodes stands
         groups[on_line[np.isin(grid.edges[on_line], line.nodes).all(axis=1)]] = line.name
     groups[grid.edge_uses == 1] = BOUNDARY
-    groups[grid.edge_uses == 0] = FRAME
+    groups[grid.edge_uses == 0] = FRAME_MEMBERS
     return [str(group) for group in groups]

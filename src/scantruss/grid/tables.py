@@ -169,7 +169,7 @@ class GridTables:
     def angles(self) -> np.ndarray:
         """(T, 3) angle of each triangle at each of its nodes [degree]."""
         angles = np.empty((len(self.triangles), 3))
-        figures.angles_of(self.nodes, self.triangles, angles)
+        figures.angles_of_triangles(self.nodes, self.triangles, angles)
         return angles
 
     def stretches(self, length: float) -> np.ndarray:

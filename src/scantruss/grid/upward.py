@@ -18,7 +18,7 @@ OPEN_SHELL = 0.5  # length of the mean normal by area above which a shell is ope
 LEAST_FACING = 0.08  # length of the mean normal by area above which it decides which way is up if no flat face does
 FACE_DEPTH = 0.02  # how flat the face is on which something stands [longest side]
 FLAT_FACE = 0.1  # least share of such a face in the plan
-UPRIGHT = 3.0  # how much more a face counts that is below in a file with y or z up
+LOWER_FACE_WEIGHT = 3.0  # how much more a face counts that is below in a file with y or z up
 POLYGON_DIRECTIONS = 64  # directions in which a convex polygon is sought
 
 
@@ -68,7 +68,7 @@ def likely_upward(nodes: np.ndarray, facing: np.ndarray) -> np.ndarray:
         for sign in (1.0, -1.0):
             height = sign * nodes[:, axis]
             down = height <= height.min() + FACE_DEPTH * extent.max()
-            usual = UPRIGHT if sign > 0.0 and axis in (1, 2) else 1.0  # most files have y or z up
+            usual = LOWER_FACE_WEIGHT if sign > 0.0 and axis in (1, 2) else 1.0  # most files have y or z up
             faces[axis, sign] = (usual * _area_around(across[down]), _area_around(across[down]) / whole)
     (axis, sign), (_, share) = max(faces.items(), key=lambda item: item[1][0])
     if share > FLAT_FACE:

@@ -15,13 +15,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..kernels.mesh.equalize import RELAXATION, settle_some
+from ..kernels.mesh.equalize import OVER_RELAXATION, settle_some
 from ..kernels.mesh.grid import Net
-from ..kernels.mesh.local_search import search, suit_nodes
+from ..kernels.mesh.local_search import search_moves, suit_nodes
 from ..kernels.mesh.partition import BETWEEN_PARTS
 from ..kernels.mesh.trial import Scratch, total_energy
 from ..runtime.parallel import two_at_once
-from .flips import flip_by_angle
+from .flips import flip_edges
 from .partition import Partition
 from .working_mesh import NEAR_IN_THE_END, WorkingMesh
 
@@ -79,7 +79,7 @@ def settle(
     weight: float,
     enough: float,
     sweeps: int,
-    stride: float = RELAXATION,
+    stride: float = OVER_RELAXATION,
     independent_sets: list[np.ndarray] | None = None,
 ) -> int:
     """Move the nodes downhill until a sweep gains less than `enough` per node; returns the sweeps made.
@@ -135,7 +135,7 @@ def _search_partition(mesh: WorkingMesh, partition: Partition, scratch: Scratch)
 
 def _search(mesh: WorkingMesh, net: Net, scratch: Scratch, terms: Terms) -> int:
     of_grid = mesh.patches, mesh.curves, scratch, mesh.length
-    return search(net, *of_grid, LENGTH_WEIGHT, terms.strain, MEAN_LENGTH_WEIGHT, terms.share, terms.nodes)
+    return search_moves(net, *of_grid, LENGTH_WEIGHT, terms.strain, MEAN_LENGTH_WEIGHT, terms.share, terms.nodes)
 
 
 class Terms(NamedTuple):
@@ -165,7 +165,7 @@ def energy_of_node(mesh: WorkingMesh) -> float:
 
 def equalize(mesh: WorkingMesh, progress: Callable[[float], None] | None = None) -> None:
     """Flip, settle and search until no move is kept: the default way to improve a grid."""
-    flip_by_angle(mesh.net)
+    flip_edges(mesh.net)
     settle(mesh, LENGTH_WEIGHT, 1e-3, 60)
     scratch = new_scratch(mesh)
     for done in range(LOCAL_SEARCH_ROUNDS):

@@ -10,7 +10,6 @@ from ..kernels.boundary.curves import nearest_on_curves
 from ..kernels.mesh.grid import AT_REST, ON_CURVE, Net, may_split, split
 from ..kernels.mesh.point_location import nearest_sample
 from ..kernels.mesh.trial import Scratch
-from ..kernels.surface.local_surface import NEAREST_SAMPLE
 from ..surface.samples import local_field
 from .equalize import FARTHEST_ON_THE_WAY, LENGTH_WEIGHT, energy_of_grid, new_scratch, search_once, settle
 from .working_mesh import WorkingMesh
@@ -140,7 +139,7 @@ def take_place(
     if b >= 0:
         a, v = v, split(net, v, b)
         mesh.patches[v] = mesh.patches[a]
-        mesh.patches[v, NEAREST_SAMPLE] = nearest_sample(mesh.surface, *place.tolist())
+        mesh.patches[v].sample = nearest_sample(mesh.surface, *place.tolist())
         net.ideal[v] = 4 if net.is_open[v] else 6
     _put_node(mesh, v, place)
     scratch.tried[nodes_around(net, v, RINGS_SEARCHED)] = 0

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..kernels.mesh.figures import angles_of, folds_of
+from ..kernels.mesh.figures import angles_of_triangles, folds_of
 from ..kernels.mesh.grid import list_triangles
 from ..kernels.mesh.local_search import COLLAPSE, FLIP, SPLIT, is_allowed, make_move
 from ..kernels.mesh.trial import Scratch, gather
@@ -65,7 +65,7 @@ def poor_places(mesh: WorkingMesh, settings: Settings) -> PoorPlaces:
     room = np.empty((int(net.degree[: net.used].sum()) + 1, 3), np.int64)
     triangles = room[: list_triangles(net, room)]
     angles = np.empty(triangles.shape)
-    angles_of(net.nodes, triangles, angles)
+    angles_of_triangles(net.nodes, triangles, angles)
     after = np.roll(triangles, -1, axis=1)
     sizes = np.linalg.norm(net.nodes[after] - net.nodes[triangles], axis=2)
     sizes /= 0.5 * mesh.length * (net.desired[after] + net.desired[triangles])

@@ -68,7 +68,7 @@ def wedge_of(planes: Sequence[MirrorPlane], origin: np.ndarray, *, half_turns: b
     return Wedge(walls, [first, second], centre, np.cross(first, normal), 2 * len(planes), half_turns)
 
 
-def sides_of(planes: Sequence[MirrorPlane]) -> list[Sequence[MirrorPlane]]:
+def sides_of_mirror(planes: Sequence[MirrorPlane]) -> list[Sequence[MirrorPlane]]:
     """Return the planes, and of a single one the same facing the other way: the other side can be kept as well."""
     if len(planes) > 1:
         return [planes]

@@ -14,7 +14,7 @@ from ..surface.samples import narrow_surface
 from ..surface.scratch import with_own_scratch
 from .equalize import equalize, finish
 from .fixed_nodes import fix_nearest_nodes, fix_nodes, hold_nodes
-from .flips import flip_by_angle
+from .flips import flip_edges
 from .mend import mend_poor_places
 from .off_scan import put_on_scan
 from .perturbation import search_widely
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from ..surface.samples import SurfaceSamples
 
 # factor of the weight of folds: a longer search can afford more of it
-FOLDS = {"quick": 1.0, "normal": 1.0, "best": 1.6}
+FOLD_WEIGHT_OF_EFFORT = {"quick": 1.0, "normal": 1.0, "best": 1.6}
 TIMES_MENDED = 2  # times that poor places are mended at most, after each of which the mesh comes to rest anew
 
 Report = Callable[[float], None]
@@ -102,13 +102,13 @@ def improve_first(
         boundary.stops,
         settings.length,
         constraints.lines,
-        settings.fold_weight * FOLDS[settings.effort],
+        settings.fold_weight * FOLD_WEIGHT_OF_EFFORT[settings.effort],
     )
     if settings.method == "paper":
-        flip_by_angle(mesh.net)
+        flip_edges(mesh.net)
         if len(constraints.positions):
             fix_nearest_nodes(mesh, constraints.positions)
-            flip_by_angle(mesh.net)
+            flip_edges(mesh.net)
     else:
         hold_nodes(mesh, constraints.positions)
         equalize(mesh, report)

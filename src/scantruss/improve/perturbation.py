@@ -50,7 +50,7 @@ def new_area(mesh: WorkingMesh, number: int = 0) -> Area:
         arc=np.zeros(MOST_NODES),
         desired=np.zeros(MOST_NODES),
         ring=np.zeros((MOST_NODES, width), np.int64),
-        patches=np.zeros((MOST_NODES, mesh.patches.shape[1])),
+        patches=np.zeros(MOST_NODES, mesh.patches.dtype),
         free=np.zeros(SAVED_FREE_NODES, np.int64),
         **{name: np.zeros(1, np.int64) for name in ("saved", "spare", "number", "gathered", "paid")},
         seed=np.array([7919 * number]),
@@ -75,7 +75,7 @@ def search_widely(mesh: WorkingMesh, effort: str, progress: Callable[[float], No
             cooled = temperature * max(0.0, 1.0 - done / (HOT_ROUNDS * rounds))
             allowance = ALLOWANCE_SEARCHED + ALLOWANCE_PER_TEMPERATURE * cooled if temperature else ALLOWANCE_SETTLED
             waiting = np.ones(len(mesh.net.arc), np.bool_)
-            perturb(mesh, mesh.net, room, waiting, terms_of(mesh, room[0]), cooled, allowance)
+            perturb_mesh(mesh, mesh.net, room, waiting, terms_of(mesh, room[0]), cooled, allowance)
             mesh.renew(FARTHEST_ON_THE_WAY)
     settle_again(mesh)
 
@@ -94,18 +94,18 @@ def perturb_in_parts(mesh: WorkingMesh) -> None:
         for side in (0, 1):
             rooms[side][1].out[:] = partition.label != side
         partition.run(
-            lambda side: perturb(mesh, partition.nets[side], rooms[side], waiting, terms, 0.0, ALLOWANCE_SEARCHED)
+            lambda side: perturb_mesh(mesh, partition.nets[side], rooms[side], waiting, terms, 0.0, ALLOWANCE_SEARCHED)
         )
 
     for _ in range(MOST_PARTITIONS):
         irregular = waiting & (net.degree > 0) & (net.degree != net.ideal)
         if irregular.sum() >= IRREGULAR_NODES_FOR_PARTS:
             perturb_both(Partition(net, irregular))
-    perturb(mesh, net, rooms[2], waiting, terms_of(mesh, rooms[2][0]), 0.0, ALLOWANCE_SEARCHED)
+    perturb_mesh(mesh, net, rooms[2], waiting, terms_of(mesh, rooms[2][0]), 0.0, ALLOWANCE_SEARCHED)
     mesh.renew(FARTHEST_ON_THE_WAY)
 
 
-def perturb(
+def perturb_mesh(
     mesh: WorkingMesh,
     net: Net,
     room: tuple[Scratch, Area],

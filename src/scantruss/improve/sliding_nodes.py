@@ -10,7 +10,7 @@ from ..grid.line_sets import FIXED_LINE, RIDGE, LineSet
 from ..kernels.boundary.curves import Curves, nearest_on_curves
 from ..kernels.mesh.grid import LOCKED, ON_CURVE, Net
 
-SNAP = 0.4  # distance within which the nearest node of a line is the end of the line [member lengths]
+SNAP_DISTANCE = 0.4  # distance within which the nearest node of a line is the end of the line [member lengths]
 ON_LINE = 0.35  # a node within this distance of a line is its own: lines are bent by up to 0.3 where they meet others [member lengths]
 
 
@@ -38,7 +38,7 @@ def with_boundary_members(grid: Grid, lines: Lines, length: float) -> Grid:
     ends = grid.edges[grid.edge_uses == 1]
 
     def is_near(place: np.ndarray) -> bool:
-        return nearest_on_curves(track, *place.tolist())[2] < SNAP * length
+        return nearest_on_curves(track, *place.tolist())[2] < SNAP_DISTANCE * length
 
     near = [is_near(a) and is_near(b) and is_near(0.5 * (a + b)) for a, b in grid.nodes[ends]]
     return grid.replace(lines=np.unique(np.concatenate([grid.lines, ends[np.array(near, np.bool_)]]), axis=0))
@@ -80,13 +80,13 @@ def find_on_lines(net: Net, lines: Lines, first: int, fixed: np.ndarray, length:
     at_stop = set()
     for place in lines.stops if len(nodes) else ():
         squares = ((net.nodes[nodes] - place) ** 2).sum(axis=1)
-        if squares.min() <= (SNAP * length) ** 2:
+        if squares.min() <= (SNAP_DISTANCE * length) ** 2:
             at_stop.add(int(nodes[squares.argmin()]))
     curves = lines.arrays
     for v in inside.tolist():
         if v not in at_stop:
             curve, arc, distance = nearest_on_curves(curves, *net.nodes[v].tolist())
-            if distance <= SNAP * length:
+            if distance <= SNAP_DISTANCE * length:
                 net.curve[v], net.arc[v] = first + curve, arc
                 if not fixed[v]:
                     net.kind[v] = ON_CURVE

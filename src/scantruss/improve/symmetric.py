@@ -18,7 +18,15 @@ from ..scan.symmetry import SYMMETRY_TOLERANCE, MirrorPlane, check_mirror_planes
 from ..settings.values import ROTATION_NUMBERS
 from .half_turned import half_turned_grid, half_turned_wedge, rows_of
 from .mirrored import MIRROR_LINE as EDGE_LINE
-from .mirrored import Wedge, check_lines_kept, mirror_lines, mirrored_grid, sides_of, wedge_of, without_edge_lines
+from .mirrored import (
+    Wedge,
+    check_lines_kept,
+    mirror_lines,
+    mirrored_grid,
+    sides_of_mirror,
+    wedge_of,
+    without_edge_lines,
+)
 from .rotated import rotated_grid, seams_of
 
 if TYPE_CHECKING:
@@ -82,7 +90,7 @@ class _Mirrored(Symmetry):
 
     @property
     def parts(self) -> int:
-        return len(sides_of(self.planes))
+        return len(sides_of_mirror(self.planes))
 
     @property
     def rows(self) -> list[tuple[float, ...]]:
@@ -92,7 +100,7 @@ class _Mirrored(Symmetry):
         return [mirror_lines(grid, wedge_of(self.planes, grid.origin), length)]
 
     def made(self, grid: Grid, edges: list[np.ndarray], length: float, part: int) -> Grid:
-        made = mirrored_grid(grid, wedge_of(sides_of(self.planes)[part], grid.origin), length)
+        made = mirrored_grid(grid, wedge_of(sides_of_mirror(self.planes)[part], grid.origin), length)
         check_lines_kept(grid, made, length, "the mirror planes")
         return made
 

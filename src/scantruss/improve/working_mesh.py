@@ -16,7 +16,7 @@ from ..kernels.mesh import grid as kernels
 from ..kernels.mesh import point_location
 from ..kernels.mesh.grid import AT_REST, LOCKED, ON_CURVE, Net
 from ..kernels.mesh.projection import project_nodes
-from ..kernels.surface.local_surface import NEAREST_SAMPLE, PATCH_COLUMNS, Surface
+from ..kernels.surface.local_surface import SURFACE_PATCH, Surface
 from ..runtime.parallel import in_parts
 from ..surface.samples import is_graded
 from ..surface.scratch import with_own_scratch
@@ -118,7 +118,7 @@ class Kept(NamedTuple):
     """A working mesh as it was."""
 
     net: Net
-    patches: np.ndarray  #: (C, PATCH_COLUMNS)
+    patches: np.ndarray  #: (C,) SURFACE_PATCH
     fixed: np.ndarray  #: (C,) bool
     projection_distance: np.ndarray  #: (C,)
 
@@ -130,7 +130,7 @@ class WorkingMesh:
     net: Net
     source: np.ndarray  #: (C,) int64 node of the grid that each node of the net stands for, -1 for a new one
     surface: Surface
-    patches: np.ndarray  #: (C, PATCH_COLUMNS) local surface of each node
+    patches: np.ndarray  #: (C,) SURFACE_PATCH, local surface of each node
     fixed: np.ndarray  #: (C,) bool, nodes at fixed positions
     curves: Curves
     length: float  #: desired member length where the length field is 1 [scan unit]
@@ -173,7 +173,7 @@ class WorkingMesh:
         if len(lines.curves):
             find_on_lines(net, lines, len(curves.total), fixed, length)
             curves, sharp = joined(curves, lines.arrays), np.concatenate([sharp, lines.sharp])
-        patches = np.zeros((len(net.degree), PATCH_COLUMNS))
+        patches = np.zeros(len(net.degree), SURFACE_PATCH)
         queue, located = np.zeros((2, len(net.degree)), np.int64)
         point_location.locate_nodes(net, surface, patches, length, queue, located)
         mesh = cls(net, source, surface, patches, fixed, curves, length, np.full(len(patches), np.nan), sharp, folds)
@@ -218,7 +218,7 @@ class WorkingMesh:
 
     def name_distances(self, measured: int) -> None:
         """Set the distance from the scan to NaN for nodes over closed holes, whose sample is not one of the first `measured`."""
-        self.projection_distance[self.patches[:, NEAREST_SAMPLE] >= measured] = np.nan
+        self.projection_distance[self.patches["sample"] >= measured] = np.nan
 
     def _scratch(self, part: int) -> Surface:
         """The scan with scratch arrays of one thread."""

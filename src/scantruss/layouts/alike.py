@@ -17,7 +17,7 @@ from ..improve.images import Images
 from ..runtime.progress import Progress
 from .charts import Charts, shortened
 from .moved import moved_grid
-from .part_vectors import APART, PartVectors, is_mirrored, is_reversed
+from .part_vectors import UNLIKE_MISFIT, PartVectors, is_mirrored, is_reversed
 
 REGULAR_ROUNDS = (12, 24)  #: in which all parts that may be alike are drawn to one kind, before each further descent
 ALIKE_ROUNDS = 400  #: of assignment and relaxation after that, and of the grid as it was
@@ -174,7 +174,7 @@ class _State(NamedTuple):
     def stage(self) -> Stage:
         """Return what of it is kept."""
         least = self.misfit[:, self.kinds].min(axis=1)
-        return Stage(self.nodes, self.kinds, float(least[least < APART].max(initial=0.0)))
+        return Stage(self.nodes, self.kinds, float(least[least < UNLIKE_MISFIT].max(initial=0.0)))
 
 
 class _Descent(NamedTuple):

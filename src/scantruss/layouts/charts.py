@@ -15,7 +15,7 @@ FARTHEST_MOVE = 0.35  #: of a node along the surface, over the mean member
 HIGHEST_RISE = 0.05  #: of a node off its tangent plane, over the mean member; by how far its quadric may rise
 STAYING_TURN = 36.0  #: turn of the boundary or of a line from which a node may be a corner; a little below that of `Settings` [degree]
 SURE_TURN = 70.0  #: turn from which it is one, whatever is beside it [degree]
-SHARPER = 1.5  #: turn of a corner over the mean of those beside it; round holes of few members have no corners
+SHARPER_CORNER = 1.5  #: turn of a corner over the mean of those beside it; round holes of few members have no corners
 LEAST_FITTED = 5  #: nodes around one, to which a quadric is fitted
 
 
@@ -84,7 +84,7 @@ def _frames_of(grid: Grid) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     for node in on.tolist():
         turn[node] = _lay_along(grid.nodes[[beside[node, 0], node, beside[node, 1]]], frames[node], quadrics[node])
     around = turn[beside[on]].mean(axis=1)
-    free[on, 0] = (turn[on] < STAYING_TURN) | ((turn[on] < SURE_TURN) & (turn[on] < SHARPER * around))
+    free[on, 0] = (turn[on] < STAYING_TURN) | ((turn[on] < SURE_TURN) & (turn[on] < SHARPER_CORNER * around))
     free[grid.fixed] = False
     return frames, free, quadrics
 

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.sparse import coo_matrix, csr_matrix
 from scipy.spatial import cKDTree
 
-CHUNK = 1_000_000  #: pairs of which the distances are computed at once
+DISTANCES_AT_ONCE = 1_000_000  #: pairs of which the distances are computed at once
 
 
 def close_pairs(nodes: np.ndarray, members: np.ndarray, apart: float | np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -31,8 +31,8 @@ def close_pairs(nodes: np.ndarray, members: np.ndarray, apart: float | np.ndarra
     reach = 2 * float(half.max() + own.max())
     pairs = cKDTree(ends.mean(axis=1)).query_pairs(reach, output_type="ndarray").astype(np.int64)
     found, distances = [np.zeros((0, 2), np.int64)], [np.zeros(0)]
-    for begin in range(0, len(pairs), CHUNK):
-        some = pairs[begin : begin + CHUNK]
+    for begin in range(0, len(pairs), DISTANCES_AT_ONCE):
+        some = pairs[begin : begin + DISTANCES_AT_ONCE]
         one, two = members[some[:, 0]], members[some[:, 1]]
         some = some[~(one[:, :, None] == two[:, None, :]).any(axis=(1, 2))]
         distance = _distances(ends[some[:, 0]], ends[some[:, 1]])

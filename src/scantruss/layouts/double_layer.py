@@ -16,13 +16,13 @@ from .layer_parts import LAYER_EDGES, SECOND_LAYERS, LayerParts, layer_parts
 
 DEPTH_WAYS = ("normal", "vertical")  #: along which the depth is measured
 BEND_WAYS = ("refuse", "reduce")  #: what is done where the grid bends too sharply for the depth
-TOP, BOTTOM, WEB = "top", "bottom", "web"  #: groups of members
+TOP_MEMBERS, BOTTOM_MEMBERS, WEB_MEMBERS = "top", "bottom", "web"  #: groups of members
 MOST_LAYERS = 9  #: that a grid can have
 LEAST_CHORD = 0.25  #: of a chord of a lower layer, measured along the first, over the length there; shorter is refused
 LEAST_GAP = 0.5  #: of the distance between two layers, measured along the normal of a triangle, over the depth
-CROSSED = 0.01  #: distance of two members that cross, over the mean length of the first layer
+CROSSED_DISTANCE = 0.01  #: distance of two members that cross, over the mean length of the first layer
 PLACES_NAMED = 4  #: in a refusal
-SHRINKING = 0.8  #: of the depth at a node that is too deep, over that of the round before
+DEPTH_SHRINKS = 0.8  #: of the depth at a node that is too deep, over that of the round before
 LEAST_DEPTH_SHARE = 0.2  #: of the depth that is asked for, to which it may be reduced
 STEEPEST_SHARE = 0.15  #: by which the share of the depth may change along a member
 
@@ -45,7 +45,8 @@ class DoubleLayer:
     nodes: np.ndarray  #: (V + W, 3) of the grid, then of the lower layers [unit of the grid]
     members: np.ndarray  #: (M, 2) int64: the layers from the top to the bottom, then the webs
     normals: np.ndarray  #: (V + W, 3) smoothed unit normals of the nodes
-    groups: dict[str, np.ndarray]  #: TOP, BOTTOM and WEB, of more layers top, layer 2, ..., web 1, ...: ids of members
+    #: ids of members of TOP_MEMBERS, BOTTOM_MEMBERS and WEB_MEMBERS; of more layers "top", "layer 2", ..., "web 1", ...
+    groups: dict[str, np.ndarray]
     under: np.ndarray  #: (V,) int64 the node of the last layer that is nearest to each node of the grid
     layers: Layers
 
@@ -106,13 +107,13 @@ def double_layer(
     _check_gap(grid, down, sum(depths))
     parts = layer_parts(grid, len(depths) + 1, second, edges or ("tapered" if second == "dual" else "closed"))
     share = np.ones(len(grid.nodes))
-    while True:  # each turn lowers the share of a node to SHRINKING times it; ends below LEAST_DEPTH_SHARE
+    while True:  # each turn lowers the share of a node to DEPTH_SHRINKS times it; ends below LEAST_DEPTH_SHARE
         nodes, shares = _places(parts, grid, down, depths, share)
         found = _too_deep(parts, grid, nodes)
         if found is None:
             break
         at, why = found
-        lower = _eased(grid, np.where(np.isin(np.arange(len(share)), at), SHRINKING * share, share))
+        lower = _eased(grid, np.where(np.isin(np.arange(len(share)), at), DEPTH_SHRINKS * share, share))
         if bends == "refuse" or lower.min() < LEAST_DEPTH_SHARE:
             _refuse(grid, at, sum(depths), why, share)
         share = lower
@@ -124,8 +125,8 @@ def _named(
 ) -> DoubleLayer:
     """Return the layers with the names of their members and nodes."""
     count = len(depths) + 1
-    names = [TOP, *(f"layer {number}" for number in range(2, count)), BOTTOM]
-    webs = [WEB] if count == 2 else [f"{WEB} {number}" for number in range(1, count)]
+    names = [TOP_MEMBERS, *(f"layer {number}" for number in range(2, count)), BOTTOM_MEMBERS]
+    webs = [WEB_MEMBERS] if count == 2 else [f"{WEB_MEMBERS} {number}" for number in range(1, count)]
     starts = np.cumsum([0, *map(len, parts.chords), *map(len, parts.webs)]).tolist()
     groups = {name: np.arange(*starts[k : k + 2]) for k, name in enumerate([*names, *webs])}
     below = units(parts.means(normals))
@@ -165,7 +166,7 @@ def _too_deep(parts: LayerParts, grid: Grid, nodes: np.ndarray) -> tuple[np.ndar
     members = np.concatenate([*parts.chords, *parts.webs])
     from .clearance import close_pairs
 
-    pairs, _ = close_pairs(nodes, members, CROSSED * float(grid.lengths.mean()))
+    pairs, _ = close_pairs(nodes, members, CROSSED_DISTANCE * float(grid.lengths.mean()))
     if len(pairs):
         ends = members[pairs].ravel()
         own = ends[ends < len(grid.nodes)]

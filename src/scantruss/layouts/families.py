@@ -21,7 +21,7 @@ from .moved import moved_grid
 
 FAMILY_ROUNDS = 300  #: of assignment and relaxation, each way but the last, which takes three times as many
 INNER_SHARE = 0.9  #: of the tolerance, within which a length is taken to be that of its family
-BISECTIONS = 60  #: of the least misfit
+BISECTIONS_OF_MISFIT = 60  #: of the least misfit
 STIFFNESS_OF_PLACE = 0.02  #: weight of staying where one is, over that of a length
 STIFFNESS_OF_MEMBERS = 0.004  #: weight of staying where one is, over all that pulls at a node
 FARTHEST_STEP = 0.05  #: of a node in one round, over the mean member
@@ -159,7 +159,7 @@ def least_misfit(lengths: np.ndarray, count: int) -> float:
     """Return the least tolerance at which so many lengths hold all members: bisection between nil and half the range."""
     low, high = 0.0, float(np.ptp(lengths)) / 2
     ordered = np.sort(lengths)
-    for _ in range(BISECTIONS):
+    for _ in range(BISECTIONS_OF_MISFIT):
         middle = (low + high) / 2
         begin = 0
         for _ in range(count):

@@ -12,7 +12,7 @@ import numpy as np
 from ..kernels.mesh.alike import turned_misfits
 
 PAIRS_AT_ONCE = 1_000_000  #: parts that are compared before it is asked whether to go on
-APART = 2.0  #: misfit of parts that cannot be alike
+UNLIKE_MISFIT = 2.0  #: misfit of parts that cannot be alike
 
 
 def is_mirrored(shift: np.ndarray, count: np.ndarray) -> np.ndarray:

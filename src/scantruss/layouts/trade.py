@@ -13,9 +13,9 @@ from ..runtime.progress import Progress
 from .alike import PartKinds, fewest_kinds
 from .families import few_lengths, least_misfit
 from .moved import moved_grid
-from .part_vectors import APART
+from .part_vectors import UNLIKE_MISFIT
 
-COUNTS = (20, 16, 12, 9, 7, 5, 3)  #: lengths that are tried
+COUNTS_TRIED = (20, 16, 12, 9, 7, 5, 3)  #: lengths that are tried
 MISFIT_BISECTIONS = 20  #: of the least misfit
 MOST_STAGES = 8  #: in the trade of kinds, of all that were on the way
 
@@ -49,7 +49,7 @@ class Traded(NamedTuple):
 def traded_lengths(
     grid: Grid,
     tolerance: float,
-    counts: Sequence[int] = COUNTS,
+    counts: Sequence[int] = COUNTS_TRIED,
     off_scan: OffScan | None = None,
     progress: Progress | None = None,
 ) -> Iterator[Traded]:
@@ -96,7 +96,7 @@ def traded_kinds(
     )
     trade = []
     for stage in (found.stages[k] for k in which):
-        low, high = 0.0, APART
+        low, high = 0.0, UNLIKE_MISFIT
         for _ in range(MISFIT_BISECTIONS):
             heard()
             done += 1

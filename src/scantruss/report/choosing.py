@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from html import escape
 from typing import TYPE_CHECKING
 
-from ..runtime.ours import MARK
+from ..runtime.ours import MADE_BY
 from ..sweep import FIGURES
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ def head_of(varied: Sequence[str], unit: str) -> tuple[str, ...]:
     return (*varied, *(named.get(figure, figure) for figure in FIGURES), "certificate")
 
 
-def rows_of(trials: Sequence[Trial], outcomes: Sequence[Outcome]) -> list[tuple[str, ...]]:
+def rows_of_designs(trials: Sequence[Trial], outcomes: Sequence[Outcome]) -> list[tuple[str, ...]]:
     """Return a row for each trial; one without a grid says why."""
     none = ("",) * len(FIGURES)
     return [
@@ -93,7 +93,7 @@ def _html_table(table: SweepTable) -> str:
     return "<table>\n" + "\n".join(lines) + "\n</table>\n"
 
 
-def encode_page(
+def encode_choice(
     title: str, tables: Sequence[SweepTable], trials: Sequence[Trial], outcomes: Sequence[Outcome]
 ) -> bytes:
     """Return a page with tables and the pictures, which lie beside it."""
@@ -105,7 +105,7 @@ def encode_page(
     ]
     return (
         f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8">\n'
-        f'<meta name="generator" content="{MARK}"><title>{escape(title)}</title>\n'
+        f'<meta name="generator" content="{MADE_BY}"><title>{escape(title)}</title>\n'
         f"<style>\n{STYLE}\n</style></head><body>\n<h1>{escape(title)}</h1>\n"
         + "".join(map(_html_table, tables))
         + "\n".join(pictures)

@@ -17,7 +17,7 @@ from types import TracebackType
 from typing import Any
 
 from ..errors import FormatError
-from .ours import MARK, check_ours
+from .ours import MADE_BY, check_ours
 from .stopping import is_clean, left_behind, put_into_place, signals_held
 
 
@@ -79,7 +79,7 @@ class SaveTogether:
 
     def json(self, path: str | Path, values: dict[str, Any]) -> None:
         """Save plain values as readable JSON."""
-        text = json.dumps({"made_by": MARK, **values}, indent=2, ensure_ascii=False, allow_nan=False)
+        text = json.dumps({"made_by": MADE_BY, **values}, indent=2, ensure_ascii=False, allow_nan=False)
         self.beside(path).write_text(text + "\n", encoding="utf-8", newline="\n")
 
     def _folder(self, place: Path) -> Path:

@@ -19,6 +19,7 @@ from typing import Any, TypeVar, cast
 
 import llvmlite.binding
 import numba
+import numpy as np
 from numba.core import event
 
 from .cache import compiled
@@ -104,6 +105,21 @@ def report_compiling(tell: Callable[[], None]) -> Iterator[None]:
 
     with event.install_listener("numba:compile", FirstOnly()):
         yield
+
+
+def record_type(**fields: type[np.generic] | tuple[type[np.generic], int]) -> np.dtype[np.void]:
+    """Return the type of records with named fields: numbers, or rows of so many numbers.
+
+    ``np.zeros(5, POINT)[2].weight`` is a field of one of five records; kernels and plain Python read and write it alike.
+    """
+    return np.dtype(
+        (np.record, [(name, *(kind if isinstance(kind, tuple) else (kind,))) for name, kind in fields.items()])
+    )
+
+
+def new_record(kind: np.dtype[np.void]) -> np.record:
+    """Return one record of a type, all zero."""
+    return cast(np.record, np.zeros(1, kind)[0])
 
 
 def kernel(function: F) -> F:

@@ -9,8 +9,8 @@ from pathlib import Path
 from .. import __version__
 from ..errors import FormatError
 
-MARK = f"ScanTruss {__version__}"  #: stands near the beginning of every file that can hold it
-CLOUD_MARK = f"point cloud by {MARK}"  #: the same of a cloud, which no other result may replace
+MADE_BY = f"ScanTruss {__version__}"  #: stands near the beginning of every file that can hold it
+CLOUD_MARK = f"point cloud by {MADE_BY}"  #: the same of a cloud, which no other result may replace
 BYTES_WITH_MARK = 8192  # bytes from the beginning in which the mark stands
 LARGEST_PDF = 50_000_000  # bytes of a PDF file in which the mark is sought
 # tables have no place for a mark: those of members, of nodes, of a sweep, of schedules, of setting out

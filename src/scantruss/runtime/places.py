@@ -11,7 +11,7 @@ from pathlib import Path
 from ..errors import FormatError
 
 #: suffix of another program -> suffix of the format that it reads
-RELATED = {
+RELATED_SUFFIXES = {
     ".dwg": ".dxf", ".dgn": ".dxf", ".rvt": ".ifc", ".igs": ".step", ".iges": ".step", ".sat": ".step", ".gltf": ".glb",
     ".fbx": ".glb", ".dae": ".glb", ".usdz": ".glb", ".shp": ".geojson", ".gpkg": ".geojson", ".kml": ".geojson", ".ods": ".xlsx",
     ".sdb": ".s2k", ".gh": ".karamba.json", ".bdf": ".inp",
@@ -32,7 +32,7 @@ def nearest_suffix(path: Path, suffixes: Collection[str]) -> str:
     double = [suffix for suffix in suffixes if suffix.count(".") > 1]  # such as .saf.xlsx
     near = (
         get_close_matches(both, double, 1, 0.8)
-        or [suffix for suffix in suffixes if suffix == RELATED.get(own)]
+        or [suffix for suffix in suffixes if suffix == RELATED_SUFFIXES.get(own)]
         or get_close_matches(own, suffixes, 1, 0.6)
     )
     return f"; the nearest is {near[0]}" if near else ""

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import FrontError
 
-SPARE = 1000  # further steps that any stage may take
+SPARE_STEPS = 1000  # further steps that any stage may take
 
 
 class Watch:
@@ -22,7 +22,7 @@ class Watch:
 
         words : what is wrong where it takes more steps, and what to do. expected : steps that it needs. multiple : of them that it may take
         """
-        self._words, self._left = words, multiple * expected + SPARE
+        self._words, self._left = words, multiple * expected + SPARE_STEPS
 
     def note(self, steps: float, where: Sequence[float] | np.ndarray) -> None:
         """Note that steps have been taken; where : the place of the last one, in the scan's own frame.

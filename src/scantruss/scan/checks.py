@@ -31,7 +31,7 @@ FAR_FROM_MIDDLE = 10.0
 SINGLE_STEP = 0.25  # step of coordinates in single precision from which a note says it [mean distances between points]
 MOST_INVALID_SHARE = 0.01  # share of the points that may be invalid; more are a fault of the file
 EXTENTS_READ = (1e-30, 1e30)  # of a scan in any unit; numbers with swapped bytes lie outside
-CAUSE = "the file is damaged, its byte order wrong, or it has no-data values"
+LIKELY_CAUSE = "the file is damaged, its byte order wrong, or it has no-data values"
 MOST_DEGREES = 1.0  # degrees that a scan spans at most
 # heights to the longer side in plan: a degree is 111 km, so metres of height are many times the degrees
 STEEPEST_DEGREES = 50.0
@@ -129,7 +129,7 @@ def find_invalid(points: np.ndarray, lower: np.ndarray, upper: np.ndarray, prefi
         most = np.abs(points[invalid]).max()
         raise InputError(
             f"{prefix}{count:,} of {len(points):,} points lie a million times farther away than half of the scan is wide,"
-            f" with coordinates up to {most:.3g}; {CAUSE}"
+            f" with coordinates up to {most:.3g}; {LIKELY_CAUSE}"
         )
     return invalid
 
@@ -240,7 +240,7 @@ def no_data_note(count: int, value: float) -> str:
 def check_sensible(extent: float, prefix: str) -> None:
     """Refuse an extent that no scan has."""
     if not EXTENTS_READ[0] <= extent <= EXTENTS_READ[1]:
-        raise InputError(f"{prefix}the points span {extent:.3g}, as no scan does; {CAUSE}")
+        raise InputError(f"{prefix}the points span {extent:.3g}, as no scan does; {LIKELY_CAUSE}")
 
 
 def single_precision_note(cloud: PointCloud) -> tuple[str, ...]:

@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import InputError, words_of_number
 from ..runtime.parallel import in_parts, processors, run_in_parts
 from .checks import (
-    CAUSE,
+    LIKELY_CAUSE,
     check_sensible,
     find_invalid,
     find_no_data,
@@ -29,7 +29,7 @@ from .units import check_unit
 
 Bounds = tuple[np.ndarray, np.ndarray]  #: the smallest and the largest coordinates, (3,) each [scan unit]
 
-INVALID = "with coordinates a million times too large"
+INVALID_COORDINATES = "with coordinates a million times too large"
 AT_NO_DATA = "with a height that stands for no data"
 AT_NO_DATA_PLACE = "at a place that stands for no data"
 LARGEST_COORDINATE = 1e100  # coordinates beyond this overflow when squared
@@ -137,7 +137,7 @@ class PointCloud:
             normals = normals[np.isfinite(array).all(axis=1)]
         if (invalid := find_invalid(clean, lower, upper, prefix)) is not None:
             notes = (invalid_values_note(clean[invalid]),)
-            left_out = ((AT_NO_DATA if have_one_height(clean[invalid]) else INVALID, int(invalid.sum())),)
+            left_out = ((AT_NO_DATA if have_one_height(clean[invalid]) else INVALID_COORDINATES, int(invalid.sum())),)
             clean = clean[~invalid]
             normals = normals if normals is None else normals[~invalid]
             lower, upper = bounds_of(clean)
@@ -213,7 +213,9 @@ def _check_extent(lower: np.ndarray, upper: np.ndarray, prefix: str) -> float:
     """Return the longest side of the cloud; refuse points that coincide or overflow."""
     largest = float(max(np.abs(lower).max(), np.abs(upper).max()))
     if largest > LARGEST_COORDINATE:
-        raise InputError(f"{prefix}coordinates must be smaller than {LARGEST_COORDINATE:g}, got {largest:.3g}; {CAUSE}")
+        raise InputError(
+            f"{prefix}coordinates must be smaller than {LARGEST_COORDINATE:g}, got {largest:.3g}; {LIKELY_CAUSE}"
+        )
     extent = float((upper - lower).max())
     if extent <= max(4 * np.finfo(float).eps * largest, 1 / LARGEST_COORDINATE):
         raise InputError(f"{prefix}all points are at the same place; a grid needs points spread over a surface")

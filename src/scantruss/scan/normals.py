@@ -23,13 +23,13 @@ def cut_steep_links(mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray
     in_parts(
         len(mean),
         NORMALS_PER_THREAD,
-        lambda _, i, j: kernels.cut_steep_links(mean, normals, neighbors, STEEP_SINE, i, j),
+        lambda _, i, j: kernels.cut_steep_links_of(mean, normals, neighbors, STEEP_SINE, i, j),
     )
 
 
 def face_off_edges(mean: np.ndarray, normals: np.ndarray, boxes: SearchBoxes, thick: np.ndarray, reach: float) -> None:
     """Let those of the thick samples (P,) that lie on a sharp edge of a body face away from it."""
-    run_in_parts(len(thick), NORMALS_PER_THREAD, kernels.face_off_edges, mean, normals, boxes, thick, reach)
+    run_in_parts(len(thick), NORMALS_PER_THREAD, kernels.face_off_edges_of, mean, normals, boxes, thick, reach)
 
 
 def face_one_side(

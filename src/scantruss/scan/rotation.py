@@ -13,7 +13,7 @@ from .symmetry import (
     FEWEST_OF_SYMMETRY,
     IMAGE_QUANTILE,
     NEAR_CELLS,
-    ROUGHLY,
+    WORTH_REFINING,
     PlacesOfScan,
     oriented,
     places_of,
@@ -83,7 +83,7 @@ def find_rotation(points: np.ndarray, tolerance: float) -> Rotation:
     for axis in axes.T:
         for order in range(MOST_TURNS, 1, -1):
             rough = Rotation(three_of(places.origin), three_of(oriented(axis)), order, 0.0)
-            if _misfit(places, rough) > ROUGHLY * tolerance:
+            if _misfit(places, rough) > WORTH_REFINING * tolerance:
                 continue
             found = _refined(places, rough)
             nearest = min(nearest, found.misfit)
@@ -130,7 +130,7 @@ def find_half_turn(points: np.ndarray, rotation: Rotation, tolerance: float) -> 
         rough = Rotation(three_of(places.origin), three_of(oriented(turn_about(axis, angle) @ first)), 2, 0.0)
         tried.append((_misfit(places, rough), angle, rough))
     misfit, _, rough = min(tried, key=lambda each: each[:2])
-    if misfit > ROUGHLY * tolerance:
+    if misfit > WORTH_REFINING * tolerance:
         return None
     exact = _squared(rotation, _refined(places, rough))
     found = replace(exact, misfit=_misfit(places, exact))

@@ -29,8 +29,8 @@ MORE_PLANES = 0.25  #: of the tolerance, which planes besides the best must keep
 #: mirror planes through one axis that are looked for: at 60 degrees rows of members run along all of them
 MOST_FOLD = 3
 LEAST_ACROSS_AXES = 0.3  #: sine of the angle of an axis to the normal of a plane through it, beyond which it is tried
-ROUGHLY = 20.0  #: tolerances within which a plane is worth refining
-CONFORMING = 2.0  #: by how far planes through one axis may be off equal angles [degree]
+WORTH_REFINING = 20.0  #: tolerances within which a plane is worth refining
+CONFORMING_ANGLE = 2.0  #: by how far planes through one axis may be off equal angles [degree]
 
 
 @dataclass(frozen=True)
@@ -220,10 +220,10 @@ def _through_one_axis(
             for k in range(1, fold):  # a surface of revolution has them at any angle
                 turned = _turned(best[0], axis, math.pi * k / fold)
                 off, _ = places.misfits(turned, best[1] * float(turned @ best[0]), everything)
-                if np.quantile(off, IMAGE_QUANTILE) > ROUGHLY * tolerance:
+                if np.quantile(off, IMAGE_QUANTILE) > WORTH_REFINING * tolerance:
                     break
                 each = _refined(places, turned, best[1] * float(turned @ best[0]))
-                if each[2] > tolerance or abs(float(each[0] @ turned)) < math.cos(math.radians(CONFORMING)):
+                if each[2] > tolerance or abs(float(each[0] @ turned)) < math.cos(math.radians(CONFORMING_ANGLE)):
                     break
                 planes.append(each)
             if len(planes) == fold:
@@ -267,13 +267,13 @@ def _axis_of(normals: np.ndarray) -> np.ndarray | None:
     """Return the line in which planes meet at equal angles; None where they do not."""
     axis = np.cross(normals[0], normals[1])
     axis /= np.linalg.norm(axis)
-    if np.abs(normals @ axis).max() > math.sin(math.radians(CONFORMING)):
+    if np.abs(normals @ axis).max() > math.sin(math.radians(CONFORMING_ANGLE)):
         return None
     beside = np.cross(axis, normals[0])
     angle = np.sort(np.degrees(np.arctan2(normals @ beside, normals @ normals[0])) % 180.0)
-    angle = np.sort(np.where(angle > 180.0 - CONFORMING, angle - 180.0, angle))
+    angle = np.sort(np.where(angle > 180.0 - CONFORMING_ANGLE, angle - 180.0, angle))
     even = np.arange(len(normals)) * 180.0 / len(normals)
-    return axis if np.abs(angle - even).max() < CONFORMING else None
+    return axis if np.abs(angle - even).max() < CONFORMING_ANGLE else None
 
 
 def _plane(

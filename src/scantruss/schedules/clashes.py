@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from .parts import Parts
 
 SAME_SIZE = 1e-9  # share of a length or angle within which two are the same
-SHORTEST, LONGEST = 100.0, 20_000.0  # mean length of members beyond which the scale may be wrong [mm]
+SHORTEST_MEAN, LONGEST_MEAN = 100.0, 20_000.0  # mean length of members beyond which the scale may be wrong [mm]
 NO_MOMENT = 1e-6  # [m]: moment over force up to which it is one of rounding
 HEAVY_BALLS = "balls are heavier than the node allowance of the structure"
 TOO_HEAVY = 1.1  # times its allowance for nodes from which the balls of a structure are too heavy for it
@@ -49,9 +49,9 @@ def warnings_table(parts: Parts) -> Schedule:
 def _scale(parts: Parts) -> list[WarningRow]:
     """Members so short or long that the scale or unit may be wrong."""
     mean = float(parts.length.mean())
-    if SHORTEST <= mean <= LONGEST:
+    if SHORTEST_MEAN <= mean <= LONGEST_MEAN:
         return []
-    limit = SHORTEST if mean < SHORTEST else LONGEST
+    limit = SHORTEST_MEAN if mean < SHORTEST_MEAN else LONGEST_MEAN
     return [("is the scale right? mean length of members", None, None, mean, limit, "mm", None, None, None)]
 
 

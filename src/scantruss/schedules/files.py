@@ -12,7 +12,7 @@ from ..errors import FormatError
 from ..export.csv import encode_table
 from ..export.workbook import NOT_IN_XML, without_dates
 from ..runtime.files import write_files
-from ..runtime.ours import MARK
+from ..runtime.ours import MADE_BY
 from ..runtime.places import check_place
 from .records import Schedule, Schedules, Value, Workbook
 
@@ -27,13 +27,13 @@ DECIMALS = {
     "m2": "0.000",
 }  # shown in a cell; it holds all digits
 MOST_ROWS = 1_048_576  # of a sheet
-MAIN = "members"  # the table in the CSV file that is named
+MAIN_TABLE = "members"  # the table in the CSV file that is named
 
 
 def schedule_paths(path: Path) -> dict[str, Path]:
     """Return the place of each table of a .csv: members in the named file, `roof.csv`, others beside it, `roof_node_types.csv`."""
     names = [spec.name for spec in fields(Schedules)]
-    return {name: path if name == MAIN else path.with_name(f"{path.stem}_{name}{path.suffix}") for name in names}
+    return {name: path if name == MAIN_TABLE else path.with_name(f"{path.stem}_{name}{path.suffix}") for name in names}
 
 
 def write_schedules(schedules: Schedules, path: str | Path) -> list[Path]:
@@ -97,7 +97,7 @@ def encode_xlsx(schedules: Workbook) -> bytes:
         sums = [column.sum for column in table.columns[1:]]
         if any(value is not None for value in sums):
             sheet.append(_filled(heavy, ["sum", *sums]))
-    book.properties.creator = MARK
+    book.properties.creator = MADE_BY
     stream = io.BytesIO()
     book.save(stream)
     return without_dates(stream.getvalue())

@@ -28,7 +28,7 @@ def schedule_lines(made: Schedules, settings: ScheduleSettings, alike: Alike | N
         f"{len(made.panels):,} panels of {len(made.panel_types):,} types within {within[PANELS]}"
         + mirrored_words(made.panel_types),
     ]
-    return [*lines, *warning_lines(made.warnings)]
+    return [*lines, *schedule_warnings(made.warnings)]
 
 
 def mirrored_words(types: Schedule) -> str:
@@ -44,7 +44,7 @@ def mirrored_words(types: Schedule) -> str:
     return f", {once:,} if mirror images count once" if once < len(first) else ""
 
 
-def warning_lines(warnings: Schedule) -> list[str]:
+def schedule_warnings(warnings: Schedule) -> list[str]:
     """Say of each kind of warning how many there are, and the worst."""
     lines = []
     for words in dict.fromkeys(warnings["warning"]):

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from .settings import ScheduleSettings
 
 METALS = ("steel", "aluminium")  # materials of which balls are made
-SMALLEST, LARGEST = 1e-3, 1e9  # lengths of which a schedule can be made [mm]
+SMALLEST_LENGTH, LARGEST_LENGTH = 1e-3, 1e9  # lengths of which a schedule can be made [mm]
 
 
 def schedule(
@@ -69,7 +69,7 @@ def schedule(
     unit, size = _size(grid, settings)
     check_grid(grid)
     longest = float(grid.lengths.max()) * size
-    if not SMALLEST <= longest <= LARGEST:
+    if not SMALLEST_LENGTH <= longest <= LARGEST_LENGTH:
         raise InputError(
             f"the longest member would be {longest:g} mm long; check --scale {settings.scale:g} and the unit, {unit}"
         )

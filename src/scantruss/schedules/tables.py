@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 DEGREE = "degree"
 LEAST_ACROSS = 1e-6  # of a normal across its member, below which the twist is undefined
-ENOUGH = 1000  # more than any bolt: stands for one that no bolt is large enough for
+NO_BOLT_ENOUGH = 1000  # more than any bolt: stands for one that no bolt is large enough for
 
 
 def all_tables(parts: Parts) -> Schedules:
@@ -72,8 +72,8 @@ def _node_forces(parts: Parts, used: np.ndarray) -> list[Column]:
     if parts.bolt is None:
         return columns
     largest = np.zeros(len(low), np.int64)
-    np.maximum.at(largest, parts.joints.node, np.where(parts.joints.bolt > 0, parts.joints.bolt, ENOUGH))
-    marks = [bolt_mark(each) if each < ENOUGH else None for each in largest[used].tolist()]
+    np.maximum.at(largest, parts.joints.node, np.where(parts.joints.bolt > 0, parts.joints.bolt, NO_BOLT_ENOUGH))
+    marks = [bolt_mark(each) if each < NO_BOLT_ENOUGH else None for each in largest[used].tolist()]
     return [*columns, column("largest bolt", "", marks)]
 
 

@@ -16,16 +16,16 @@ from scipy.sparse import identity
 from ..runtime.progress import Progress
 from ..structure.frame import freedoms
 from ..structure.mechanism import softest_motion
-from ..structure.statics import SINGULAR, Factored, scaled_stiffness, solve
+from ..structure.statics import SINGULAR_EIGENVALUE, Factored, scaled_stiffness, solve
 from ..structure.substructures import factor_by_parts
 from ..structure.truss import LoadCase, Truss
 
-SHIFT = 1e-13  # of the scaled stiffness, so that a pivot that is nil does not end the elimination
+PIVOT_SHIFT = 1e-13  # of the scaled stiffness, so that a pivot that is nil does not end the elimination
 MOST_TIMES = 2.0  # most that a step that stands moves, over the moves of the whole
 MOST_MOVE = (0.01, 0.1)  # least and greatest value of that limit, over the median length of members
 PROPS_APART = 3.0  # members between props that are set at once
-NONE = np.zeros(0, np.int64)  # no nodes
-LOOSE = 1e-9  # a smaller pivot of the scaled stiffness is one of a motion without resistance
+NO_NODES = np.zeros(0, np.int64)  # no nodes
+LOOSE_PIVOT = 1e-9  # a smaller pivot of the scaled stiffness is one of a motion without resistance
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,17 +50,17 @@ def assembly_steps(truss: Truss, ring: np.ndarray, progress: Progress | None = N
         Called with what is done, and which share of it.
     """
     added = ring[truss.members].max(axis=1)
-    _, moves = _stand(_part(truss, np.arange(len(added))), NONE, 0.0, give_up=True)
+    _, moves = _stand(_part(truss, np.arange(len(added))), NO_NODES, 0.0, give_up=True)
     least, most = (share * float(np.median(truss.lengths)) for share in MOST_MOVE)
     limit = min(max(MOST_TIMES * moves, least), most)
-    props, steps = NONE, []
+    props, steps = NO_NODES, []
     for number in range(int(ring.max()) + 1):
         if progress is not None:
             progress("assembly", number / (int(ring.max()) + 1))
         built = np.flatnonzero(added <= number)
         if len(built):
             part, nodes = _part(truss, built), np.unique(truss.members[built])
-            placed, moves = _stand(part, NONE, limit, give_up=True)
+            placed, moves = _stand(part, NO_NODES, limit, give_up=True)
             if moves > limit or len(placed):
                 placed, moves = _stand(part, np.searchsorted(nodes, props), limit)
             props = nodes[placed]
@@ -135,16 +135,16 @@ def _examine(part: Truss) -> Factored | tuple[np.ndarray, np.ndarray]:
     made, width = scaled_stiffness(part), freedoms(part)
     if len(made.free) == 0:
         return made
-    factor = factor_by_parts((made.scaled + SHIFT * identity(len(made.free))).tocsc(), made.first)
-    nil = made.free[np.abs(factor.pivots) < LOOSE]
+    factor = factor_by_parts((made.scaled + PIVOT_SHIFT * identity(len(made.free))).tocsc(), made.first)
+    nil = made.free[np.abs(factor.pivots) < LOOSE_PIVOT]
     if (nil % width < 3).any():
-        return np.unique(nil[nil % width < 3] // width), NONE
+        return np.unique(nil[nil % width < 3] // width), NO_NODES
     value, motion = softest_motion(made.scaled, factor)
-    if value >= 10 * SINGULAR and len(nil) == 0:
+    if value >= 10 * SINGULAR_EIGENVALUE and len(nil) == 0:
         return replace(made, factor=factor)
     everywhere = np.zeros((len(part.nodes), width))
     everywhere.ravel()[made.free] = motion / made.root
     moves, turns = (np.linalg.norm(everywhere[:, k : k + 3], axis=1) for k in (0, 3))
     if moves.max() > 1e-6 * float(turns.max()) * float(part.lengths.max()):
-        return np.array([moves.argmax()]), NONE
-    return NONE, np.array([turns.argmax()])  # a straight row of members turns about itself
+        return np.array([moves.argmax()]), NO_NODES
+    return NO_NODES, np.array([turns.argmax()])  # a straight row of members turns about itself

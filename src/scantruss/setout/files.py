@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import FormatError, how_to_install
 from ..export.csv import encode_table
 from ..runtime.files import write_files
-from ..runtime.ours import MARK
+from ..runtime.ours import MADE_BY
 from ..runtime.places import check_place
 from ..schedules.files import encode_xlsx
 from .make import TABLES
@@ -27,8 +27,8 @@ NEEDS_EZDXF = f"writing .dxf needs ezdxf; install it with: {how_to_install('cad'
 LAYER_COLOURS = (8, 1, 5, 7, 8, 3, 6, 9)  # of the layers, AutoCAD colour index
 LAYER_INKS = ("0.55", "#c0202a", "#2040c0", "0", "0.45", "#208030", "#803090", "0.75")  # of the layers
 USUAL_SCALES = [base * 10**power for power in range(6) for base in (1, 2, 2.5, 5)]  # 1 : so much
-MARGIN, FOOT = 10.0, 14.0  # of a page [mm]
-POINT = 25.4 / 72  # [mm]
+SHEET_MARGIN, SHEET_FOOT = 10.0, 14.0  # of a page [mm]
+POINT_LENGTH = 25.4 / 72  # [mm]
 LEAST_WORD, LARGEST_WORD = 0.6, 3.0  # height on paper [mm]
 
 
@@ -82,10 +82,12 @@ def write_setting_out(made: SettingOut, path: str | Path) -> list[Path]:
     if suffix == ".xlsx":
         return write_files({path: encode_xlsx(made)})
     sheets = make_sheets(made)
-    return write_files({path: encode_dxf(sheets) if suffix == ".dxf" else encode_pdf(sheets, made.settings.paper)})
+    return write_files(
+        {path: encode_plan_dxf(sheets) if suffix == ".dxf" else encode_plan_pdf(sheets, made.settings.paper)}
+    )
 
 
-def encode_dxf(sheets: list[Sheet]) -> bytes:
+def encode_plan_dxf(sheets: list[Sheet]) -> bytes:
     """Return the drawings as DXF in millimetres: the plan in the building frame, the others below it, a layer for each kind of line."""
     ezdxf = _ezdxf()
     from ezdxf.enums import TextEntityAlignment
@@ -116,7 +118,7 @@ def encode_dxf(sheets: list[Sheet]) -> bytes:
         document.write(stream)
     finally:
         ezdxf.options.write_fixed_meta_data_for_testing = fixed
-    return f"999\n{MARK}\n{stream.getvalue()}".encode()
+    return f"999\n{MADE_BY}\n{stream.getvalue()}".encode()
 
 
 def _word(sheet: Sheet, layer: str) -> float:
@@ -128,17 +130,17 @@ def scale_on(sheet: Sheet, paper: str) -> tuple[float, tuple[float, float]]:
     """Return the largest usual scale (1 : so much) at which a drawing fits on a page, and the page's width and height [mm]."""
     wide, tall = PAPERS[paper]
     size = np.subtract(*sheet.extent[::-1])
-    room = np.array([wide - 2 * MARGIN, tall - 2 * MARGIN - FOOT])
+    room = np.array([wide - 2 * SHEET_MARGIN, tall - 2 * SHEET_MARGIN - SHEET_FOOT])
     need = float((size / room).max())
     return next((scale for scale in USUAL_SCALES if scale >= need), need), (float(wide), float(tall))
 
 
-def encode_pdf(sheets: list[Sheet], paper: str) -> bytes:
+def encode_plan_pdf(sheets: list[Sheet], paper: str) -> bytes:
     """Return the drawings as PDF, a page each, to scale."""
     from matplotlib.backends.backend_pdf import PdfPages
 
     stream = io.BytesIO()
-    with PdfPages(stream, metadata={"Creator": MARK, "Producer": MARK, "CreationDate": None}) as pages:
+    with PdfPages(stream, metadata={"Creator": MADE_BY, "Producer": MADE_BY, "CreationDate": None}) as pages:
         for sheet in sheets:
             pages.savefig(_page(sheet, paper))
     return stream.getvalue()
@@ -150,7 +152,7 @@ def _page(sheet: Sheet, paper: str) -> Any:
 
     scale, (wide, tall) = scale_on(sheet, paper)
     low, high = sheet.extent
-    shift = np.array([wide, tall + FOOT]) / 2 - (low + high) / 2 / scale
+    shift = np.array([wide, tall + SHEET_FOOT]) / 2 - (low + high) / 2 / scale
     figure = Figure(figsize=(wide / 25.4, tall / 25.4))
     axes = figure.add_axes((0, 0, 1, 1))
     axes.set(xlim=(0, wide), ylim=(0, tall))
@@ -168,10 +170,18 @@ def _page(sheet: Sheet, paper: str) -> Any:
             "family": "DejaVu Sans",
             "color": inks[word.layer],
         }
-        axes.text(x, y, word.text, fontsize=size / POINT / 0.73, ha="center", va="center", **look)
+        axes.text(x, y, word.text, fontsize=size / POINT_LENGTH / 0.73, ha="center", va="center", **look)
     whole = f"1:{scale:g}"
-    axes.text(MARGIN, MARGIN, f"{sheet.title}   {whole}   lengths in mm   {MARK}", fontsize=8, family="DejaVu Sans")
+    axes.text(
+        SHEET_MARGIN,
+        SHEET_MARGIN,
+        f"{sheet.title}   {whole}   lengths in mm   {MADE_BY}",
+        fontsize=8,
+        family="DejaVu Sans",
+    )
     bar = 10 ** np.floor(np.log10(60 * scale)) / scale  # a round length, at most 60 mm on paper
-    axes.plot([wide - MARGIN - bar, wide - MARGIN], [MARGIN, MARGIN], color="0", linewidth=2)
-    axes.text(wide - MARGIN, MARGIN + 2, f"{bar * scale:g} mm", fontsize=8, ha="right", family="DejaVu Sans")
+    axes.plot([wide - SHEET_MARGIN - bar, wide - SHEET_MARGIN], [SHEET_MARGIN, SHEET_MARGIN], color="0", linewidth=2)
+    axes.text(
+        wide - SHEET_MARGIN, SHEET_MARGIN + 2, f"{bar * scale:g} mm", fontsize=8, ha="right", family="DejaVu Sans"
+    )
     return figure

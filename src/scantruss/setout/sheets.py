@@ -25,10 +25,11 @@ LAYERS = (
     HEIGHT_LINES,
     GROUND_LINES,
 )
-BELOW, ROOM = 6.4, 22.0  # where heights are written, and room between rows, over the height of words
+# where heights are written, and room between rows, over the height of words
+HEIGHTS_BELOW, ROOM_BETWEEN_ROWS = 6.4, 22.0
 # distance of words beside each other, and length of lines that lead to them, over the height of words
-BESIDE, LEADER = 1.3, 1.2
-WORD = 0.11  # height of marks over the median length of members, as they are seen in plan
+WORDS_BESIDE, LEADER_LENGTH = 1.3, 1.2
+WORD_HEIGHT = 0.11  # height of marks over the median length of members, as they are seen in plan
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +62,7 @@ def make_sheets(made: SettingOut) -> list[Sheet]:
     """Return the plan, of layers one of each and of the webs between, a sheet for each section and one for each boundary."""
     flat = made.places[:, :2]
     spans = np.linalg.norm(np.diff(flat[made.grid.edges], axis=1)[:, 0], axis=1)
-    height = WORD * float(np.median(spans))
+    height = WORD_HEIGHT * float(np.median(spans))
     return [
         *(_plan(made, height, title, members) for title, members in _plans(made)),
         *(_section(made, number, height) for number in range(len(made.section_lines))),
@@ -112,16 +113,16 @@ def _section(made: SettingOut, number: int, height: float) -> Sheet:
     lines = [(MEMBER_LINES, segment[:, flat]) for segment in line.segments]
     lines.append((GROUND_LINES, np.array([(line.flat[0, 0], ground), (line.flat[-1, 0], ground)])))
     words = []
-    beside = _apart(line.flat[:, 0], BESIDE * height).tolist()
+    beside = _apart(line.flat[:, 0], WORDS_BESIDE * height).tolist()
     for (x, z), aside, node, member in zip(
         line.flat.tolist(), beside, line.nodes.tolist(), line.members.tolist(), strict=True
     ):
         lines.append((HEIGHT_LINES, np.array([(x, ground), (x, z)])))
-        lines.append((HEIGHT_LINES, np.array([(x, ground), (aside, ground - LEADER * height)])))
-        lines.append((MEMBER_LINES, np.array([(x, z), (aside, z + 0.4 * LEADER * height)])))
+        lines.append((HEIGHT_LINES, np.array([(x, ground), (aside, ground - LEADER_LENGTH * height)])))
+        lines.append((MEMBER_LINES, np.array([(x, z), (aside, z + 0.4 * LEADER_LENGTH * height)])))
         mark = made.node_marks[node] if node >= 0 else made.member_marks[member]
         words.append(Words(NODE_MARKS if node >= 0 else MEMBER_MARKS, mark, (aside, z + 2.4 * height), 90.0))
-        words.append(Words(HEIGHT_LINES, f"{x:.0f} / {z:.0f}", (aside, ground - BELOW * height), 90.0))
+        words.append(Words(HEIGHT_LINES, f"{x:.0f} / {z:.0f}", (aside, ground - HEIGHTS_BELOW * height), 90.0))
     return Sheet(f"Section {line.name}", _with_room(lines, height), words, height)
 
 
@@ -142,7 +143,7 @@ def _unrolled(made: SettingOut, number: int, height: float) -> Sheet:
     each = made.boundaries[number]
     ground, used = float(each.height.min()), np.unique(made.grid.edges)
     longest = max(float(np.ptp(made.places[used, :2], axis=0).max()), float(np.diff(each.along).max()))
-    down = float(np.ptp(each.height)) + ROOM * height
+    down = float(np.ptp(each.height)) + ROOM_BETWEEN_ROWS * height
     nodes = np.append(each.nodes, each.nodes[0])
     lines: list[tuple[str, np.ndarray]] = []
     words: list[Words] = []
@@ -158,7 +159,7 @@ def _unrolled(made: SettingOut, number: int, height: float) -> Sheet:
         ):
             lines.append((HEIGHT_LINES, np.array([(x, low), (x, z)])))
             words.append(Words(NODE_MARKS, made.node_marks[node], (x, z + 2.2 * height), 90.0))
-            words.append(Words(HEIGHT_LINES, f"{along:.0f} / {true:.0f}", (x, low - BELOW * height), 90.0))
+            words.append(Words(HEIGHT_LINES, f"{along:.0f} / {true:.0f}", (x, low - HEIGHTS_BELOW * height), 90.0))
             if made.held[node].any():
                 lines.append((SUPPORT_MARKS, _diamond(np.array([x, z]), height)))
         begin, row = end - 1, row + 1

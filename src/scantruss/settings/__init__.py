@@ -1,9 +1,9 @@
 """Settings of a run: a record for each stage, all of them together, and the checks of their values."""
 
-from .records import HOLE as HOLE
 from .records import JUDGE_OUTLIERS as JUDGE_OUTLIERS
 from .records import RECORDS as RECORDS
 from .records import SAMPLE_SPACING as SAMPLE_SPACING
+from .records import SMALLEST_HOLE as SMALLEST_HOLE
 from .records import SMOOTH_SAMPLE_SPACING as SMOOTH_SAMPLE_SPACING
 from .records import UNITS as UNITS
 from .records import BoundarySettings as BoundarySettings

@@ -15,7 +15,8 @@ from ..selection import FORMS, RETURNS
 
 SAMPLE_SPACING = 0.2  # spacing of the surface samples of a scan [member lengths]
 SMOOTH_SAMPLE_SPACING = 0.3  # spacing of the surface samples of a dense, smooth scan [member lengths]
-HOLE = 4.0  # boundary length of the smallest hole worth keeping; the front runs over smaller ones [member lengths]
+# boundary length of the smallest hole worth keeping; the front runs over smaller ones [member lengths]
+SMALLEST_HOLE = 4.0
 CELLS = ("triangle", "quad", "hexagon")
 ROW_GUIDES = ("boundary", "curvature")
 JUDGE_OUTLIERS = ("auto", "always")
@@ -238,7 +239,7 @@ class BoundarySettings(_Checked):
     )
     fill_holes: float | None = _setting(
         None,
-        f"close holes with a shorter boundary than this; 0 keeps all; none: {HOLE:g} member lengths",
+        f"close holes with a shorter boundary than this; 0 keeps all; none: {SMALLEST_HOLE:g} member lengths",
         unit="scan unit",
         source="Sec. 3.6",
         low=0.0,

@@ -12,7 +12,7 @@ from typing import Any
 from ..errors import InputError, did_you_mean
 from ..selection import Selection
 from .records import (
-    HOLE,
+    SMALLEST_HOLE,
     BoundarySettings,
     CheckSettings,
     CleaningSettings,
@@ -95,10 +95,15 @@ class Settings(
             f"settings must be Settings, as in Settings(length=1.5), got {type(given).__name__} {given!r:.40}"
         )
 
+    @property
+    def chosen(self) -> dict[str, Any]:
+        """The settings that are not the default."""
+        own = {spec.name: getattr(self, spec.name) for spec in fields(self)}
+        return {spec.name: own[spec.name] for spec in fields(self) if own[spec.name] != spec.default}
+
     def __repr__(self) -> str:
         """Name the settings that are not the default."""
-        own = [spec.name for spec in fields(self) if getattr(self, spec.name) != spec.default]
-        return f"Settings({', '.join(f'{name}={getattr(self, name)!r}' for name in own)})"
+        return f"Settings({', '.join(f'{name}={value!r}' for name, value in self.chosen.items())})"
 
     @property
     def selection(self) -> Selection:
@@ -117,12 +122,12 @@ class Settings(
     @property
     def closed_boundary_length(self) -> float:
         """Holes with a shorter boundary than this are closed [scan unit]."""
-        return HOLE * self.length if self.fill_holes is None else self.fill_holes
+        return SMALLEST_HOLE * self.length if self.fill_holes is None else self.fill_holes
 
     @property
     def bridged_boundary_length(self) -> float:
         """Of these, the front runs over those with a shorter boundary than this; the others are filled [scan unit]."""
-        return min(HOLE * self.length, self.closed_boundary_length)
+        return min(SMALLEST_HOLE * self.length, self.closed_boundary_length)
 
     def replace(self, **changes: Any) -> Settings:
         """Return a copy with some values changed."""

@@ -16,7 +16,7 @@ from .catalogue import Material, Section
 from .results import MOMENT_Y, MOMENT_Z, SHEAR_Y, SHEAR_Z, CaseResult
 from .truss import Truss
 
-CLAUSES = (
+CLAUSES_CHECKED = (
     "6.2.3 tension",
     "6.2.4 compression",
     "6.2.6 shear",
@@ -25,7 +25,7 @@ CLAUSES = (
     "6.3.3 bending and compression",
 )
 #: imperfection factors of the buckling curves, table 6.1
-IMPERFECTION = {"a0": 0.13, "a": 0.21, "b": 0.34, "c": 0.49, "d": 0.76}
+IMPERFECTION_FACTORS = {"a0": 0.13, "a": 0.21, "b": 0.34, "c": 0.49, "d": 0.76}
 MOST_UTILIZATION = 1000  #: that is written as a number
 NO_BUCKLING = 0.2  #: relative slenderness up to which a member does not buckle, 6.3.1.2(4)
 
@@ -121,7 +121,9 @@ def strengths(truss: Truss, settings: MemberChecks | None = None) -> Strength:
     if open_.any():
         twisting = _twisting_load(truss, length)
         relative[:, 1] = np.maximum(relative[:, 1], np.where(open_, np.sqrt(area * strength / twisting), 0.0))
-    curves = [[IMPERFECTION[buckling_curve(section, material, axis)] for axis in "yz"] for section in truss.sections]
+    curves = [
+        [IMPERFECTION_FACTORS[buckling_curve(section, material, axis)] for axis in "yz"] for section in truss.sections
+    ]
     chi = reduction(relative, np.array(curves)[truss.section_of])
     modulus = np.stack([np.where(plastic, of(f"plastic_{axis}"), of(f"elastic_{axis}")) for axis in "yz"], axis=1)
     lateral = np.ones(len(length))
@@ -131,7 +133,7 @@ def strengths(truss: Truss, settings: MemberChecks | None = None) -> Strength:
         )  # critical, all along the member
         slender = np.sqrt(modulus[:, 0] * strength / moment)
         tall = np.array([section.depth > 2 * section.width for section in truss.sections])[truss.section_of]
-        alpha = np.where(tall, IMPERFECTION["b"], IMPERFECTION["a"])  # tables 6.3, 6.4
+        alpha = np.where(tall, IMPERFECTION_FACTORS["b"], IMPERFECTION_FACTORS["a"])  # tables 6.3, 6.4
         lateral = np.where(open_, reduction(slender, alpha), 1.0)
     return Strength(
         truss=truss,
@@ -147,7 +149,7 @@ def strengths(truss: Truss, settings: MemberChecks | None = None) -> Strength:
 
 
 def utilizations(strength: Strength, result: CaseResult) -> np.ndarray:
-    """Return the (M, 6) utilizations of the members by the clauses of `CLAUSES`.
+    """Return the (M, 6) utilizations of the members by the clauses of `CLAUSES_CHECKED`.
 
     On the safe side: the greatest forces along a member act at one place, sums are linear, and the factors of equivalent moment of
     EN 1993-1-1 annex B are 1.

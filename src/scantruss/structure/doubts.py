@@ -10,7 +10,7 @@ from .options import StructureSettings, units_taken
 from .truss import Truss
 
 #: share of the surface that faces one way on the mean; ratio of its parts along x or y and along z: it may lie on its side
-ONE_WAY, SIDEWAYS = 0.6, 2.0
+ONE_WAY_SHARE, SIDEWAYS_RATIO = 0.6, 2.0
 MANY_HELD = 0.8  #: share of the nodes of a structure from which supports are odd
 
 
@@ -75,7 +75,10 @@ def _sideways(truss: Truss) -> list[str]:
     areas = truss.triangle_areas
     facing = np.abs(areas.sum(axis=0))
     axis = int(facing[:2].argmax())
-    if np.linalg.norm(facing) < ONE_WAY * np.linalg.norm(areas, axis=1).sum() or facing[axis] <= SIDEWAYS * facing[2]:
+    if (
+        np.linalg.norm(facing) < ONE_WAY_SHARE * np.linalg.norm(areas, axis=1).sum()
+        or facing[axis] <= SIDEWAYS_RATIO * facing[2]
+    ):
         return []
     name = "xy"[axis]
     return [

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from .corotational import Answer, Members, Response, answer, respond
 from .frame import LENGTHEN, freedoms, member_freedoms
 from .mechanism import softest_motion
-from .statics import SINGULAR, Factored, dead_loads
+from .statics import SINGULAR_EIGENVALUE, Factored, dead_loads
 from .substructures import Factor, SingularError, Substructures
 from .truss import LoadCase
 
@@ -158,7 +158,7 @@ class Equilibrium:
             factor = self._parts.factor(matrix)
         except SingularError:  # take the next matrix
             shifted = matrix.data.copy()
-            shifted[self._diagonal] += SINGULAR / 10
+            shifted[self._diagonal] += SINGULAR_EIGENVALUE / 10
             factor = self._parts.factor(self._matrix(shifted))
         return Tangent(matrix, factor, self.root)
 

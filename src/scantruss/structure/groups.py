@@ -7,7 +7,7 @@ import re
 import numpy as np
 
 from ..errors import InputError
-from ..grid.groups import BOUNDARY, FRAME, INNER
+from ..grid.groups import BOUNDARY, FRAME_MEMBERS, INNER
 from ..kernels.geometry.components import component_labels
 from .truss import Truss
 
@@ -63,7 +63,7 @@ def _lines(truss: Truss) -> list[str]:
         if name.startswith("line:"):
             words[np.isin(truss.members, nodes).all(axis=1)] = name
     words[boundary_members(truss)] = BOUNDARY
-    words[_triangles_at(truss) == 0] = FRAME
+    words[_triangles_at(truss) == 0] = FRAME_MEMBERS
     for name, members in truss.member_sets.items():
         words[members] = name
     return words.tolist()

@@ -18,7 +18,7 @@ from ..errors import FormatError
 from ..grid.alike import Alike
 from ..grid.panels import loops_of, table_of
 from ..layouts.double_layer import Layers
-from ..runtime.ours import MARK
+from ..runtime.ours import MADE_BY
 from .catalogue import Material, Section
 from .report import StructureReport
 from .results import Solution
@@ -40,7 +40,7 @@ def encode_structure(truss: Truss, solution: Solution | None = None, report: Str
     values: dict[str, Any] = {
         "format": STRUCTURE_FORMAT,
         "format_version": STRUCTURE_VERSION,
-        "made_by": MARK,
+        "made_by": MADE_BY,
         "units": UNITS_WRITTEN,
         "scale": truss.scale,
         "pinned": truss.pinned,

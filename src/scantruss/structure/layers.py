@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..layouts.clearance import angles_at_nodes, close_pairs
-from ..layouts.double_layer import PLACES_NAMED, WEB
+from ..layouts.double_layer import PLACES_NAMED, WEB_MEMBERS
 from .truss import Truss
 
 LEAST_WEB_ANGLE = 30.0  #: between a web and another member at a node [degree]
@@ -73,7 +73,7 @@ class LayerChecks:
 def _webs(truss: Truss) -> np.ndarray:
     """Return the ids of the webs."""
     return np.concatenate(
-        [np.zeros(0, np.int64), *(ids for name, ids in truss.member_sets.items() if name.startswith(WEB))]
+        [np.zeros(0, np.int64), *(ids for name, ids in truss.member_sets.items() if name.startswith(WEB_MEMBERS))]
     )
 
 

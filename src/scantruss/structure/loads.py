@@ -39,13 +39,13 @@ if TYPE_CHECKING:
 PERMANENT_FACTORS = (1.35, 1.0)  #: of permanent actions, unfavourable and favourable: EN 1990 table A1.2(B), 6.10
 VARIABLE_FACTOR = 1.5  #: of variable actions: EN 1990 table A1.2(B)
 #: psi 0 of EN 1990 table A1.1: imposed loads of category A, snow up to 1000 m above the sea, wind, temperature
-COMPANION = {"variable": 0.7, "snow": 0.5, "wind": 0.6, "temperature": 0.6}
-ACTIONS = ("permanent", *COMPANION)
+COMPANION_FACTORS = {"variable": 0.7, "snow": 0.5, "wind": 0.6, "temperature": 0.6}
+ACTIONS = ("permanent", *COMPANION_FACTORS)
 ON_AREAS = ("cladding", "snow", "half-snow", "wind")
 MOST_ALLOWANCE = 2  #: weight of the nodes over that of the members; more is a share that was meant in percent
 LOAD_NAMES = ("self", "cladding", "snow", "half-snow", "wind", "temperature")
 LOAD_WORDS = "self, cladding:P, snow:P, half-snow:P, wind:P:C, temperature:T"
-ONCE = ("self", "snow", "temperature")  #: loads of which a second one is a slip
+LOADS_GIVEN_ONCE = ("self", "snow", "temperature")  #: loads of which a second one is a slip
 #: directions of half the snow, unless others are given [degree from x]
 HALF_SNOW_DIRECTIONS = (0.0, 90.0, 180.0, 270.0)
 ALL_DIRECTIONS = tuple(30.0 * k for k in range(12))  #: those of `@all`
@@ -66,7 +66,7 @@ def cases_of(truss: Truss, loads: str | Sequence[Any], node_allowance: float = 0
         )
     given = split_loads(loads) if isinstance(loads, str) else list(loads)
     words = [str(load).strip().partition(":")[0] for load in given if not isinstance(load, LoadCase | Mapping)]
-    for name in ONCE:
+    for name in LOADS_GIVEN_ONCE:
         if words.count(name) > 1:
             raise InputError(
                 f"the load {name} is given {words.count(name)} times; give it once, or cases of other names in a file"
@@ -105,7 +105,7 @@ def usual_combinations(cases: Sequence[LoadCase]) -> tuple[Combination, ...]:
     ways: list[list[tuple[str, float]]] = [[]]
     for action, names in groups.items():
         others = [
-            [None, *((other, COMPANION[kind]) for other in members)]
+            [None, *((other, COMPANION_FACTORS[kind]) for other in members)]
             for kind, members in groups.items()
             if kind != action
         ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 MIXED_ITERATIONS = 6  #: iterations that are looked back on
-NIL = 1e-10  #: share of the largest singular value below which changes are ignored
+NIL_SINGULAR_VALUE = 1e-10  #: share of the largest singular value below which changes are ignored
 
 
 class Mixture:
@@ -27,7 +27,9 @@ class Mixture:
             changes = np.diff(np.stack([*self.given, given]), axis=0)
             weighted = changes[:, :-1] * self.weights
             table = np.einsum("if,jf->ij", weighted, weighted)  # no BLAS: see `mechanism.product`
-            parts = np.linalg.lstsq(table, np.einsum("if,f->i", weighted, step * self.weights), rcond=NIL)[0]
+            parts = np.linalg.lstsq(
+                table, np.einsum("if,f->i", weighted, step * self.weights), rcond=NIL_SINGULAR_VALUE
+            )[0]
             best = given - np.einsum("i,if->f", parts, np.stack(self.taken) + changes)
         self.given, self.taken = [*self.given, given][-MIXED_ITERATIONS:], [*self.taken, best][-MIXED_ITERATIONS:]
         return best[:-1], float(best[-1])

@@ -25,10 +25,10 @@ from .truss import GRAVITY, Truss
 
 FEW_FREEDOMS = 200  #: up to which all modes are found at once by dense matrices
 SEVERAL_LEADING = 3  #: combinations of which buckling is looked at, with different leading actions
-ROUGH, EXACT = 3e-2, 1e-9  #: what is left of an eigenvector, for the first estimate and in the end
+ROUGH_RESIDUAL, EXACT_RESIDUAL = 3e-2, 1e-9  #: what is left of an eigenvector, for the first estimate and in the end
 #: shares of the first value about which the others are looked for, until none lies before
 MODE_SHIFTS = (0.97, 0.8, 0.5)
-NEGLIGIBLE = 1e-9  #: share of the largest eigenvalue below which one is nil
+NEGLIGIBLE_EIGENVALUE = 1e-9  #: share of the largest eigenvalue below which one is nil
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,10 +134,10 @@ def _of_many(part: csc_matrix, stiff: csc_matrix, factored: Factored, count: int
     """Return `count` largest eigenvalues of `part` x = mu `stiff` x (K,) with their vectors (F, K), or one that is not positive."""
     factor = factored.factor
     assert factor is not None
-    first, vectors = _of_factor(part, stiff, factor, 1, ROUGH)
+    first, vectors = _of_factor(part, stiff, factor, 1, ROUGH_RESIDUAL)
     usual = np.random.default_rng(1).standard_normal(stiff.shape[0])
     made = factor.solve(part @ usual)
-    if first[0] ** 2 * product(usual, usual) <= NEGLIGIBLE**2 * product(made, made) or first[0] < 0:
+    if first[0] ** 2 * product(usual, usual) <= NEGLIGIBLE_EIGENVALUE**2 * product(made, made) or first[0] < 0:
         return first, vectors
     for share in MODE_SHIFTS:
         shift = share / float(first[0])
@@ -147,10 +147,10 @@ def _of_many(part: csc_matrix, stiff: csc_matrix, factored: Factored, count: int
         except SingularError:  # an eigenvalue lies there
             continue
         if moved.negative == 0:  # none lies before
-            near = largest_eigenpairs(moved, stiff, stiff, count, EXACT)
+            near = largest_eigenpairs(moved, stiff, stiff, count, EXACT_RESIDUAL)
             if near is not None:
                 return (near[0] - 1) / (shift * near[0]), near[1]  # near: factors over what they are beyond the shift
-    return _of_factor(part, stiff, factor, count, EXACT)
+    return _of_factor(part, stiff, factor, count, EXACT_RESIDUAL)
 
 
 def _of_factor(
@@ -180,7 +180,7 @@ def _largest(factored: Factored, matrix: csc_matrix, count: int) -> tuple[np.nda
         values, vectors = eigh(part.toarray(), stiff.toarray())
     else:
         values, vectors = _of_many(part, stiff, factored, count)
-    order = [k for k in np.argsort(-values)[:count] if values[k] > NEGLIGIBLE * np.abs(values).max()]
+    order = [k for k in np.argsort(-values)[:count] if values[k] > NEGLIGIBLE_EIGENVALUE * np.abs(values).max()]
     shapes = np.zeros((len(order), nodes, 3))
     for number, k in enumerate(order):
         moves = np.zeros(nodes * width)

@@ -29,22 +29,22 @@ from .truss import LoadCase, Truss
 PATH_STEPS = 30  #: of a path at most, unless told otherwise
 FIRST_STEPS = 10  #: the first step is this part of the way to where linear theory buckles
 STEPS_BEYOND = 5  #: steps after the structure has lost its stability
-MULTIPLE = 2.0  #: of the linear buckling factor, at which a path ends that stays stable
+FACTOR_AT_END = 2.0  #: of the linear buckling factor, at which a path ends that stays stable
 UNBUCKLED_FACTOR = 10.0  #: load factor at which a path ends that stays stable where linear theory does not buckle
-BALANCED = 1e-9  #: error of equilibrium at which a step has converged
-ITERATIONS = 50  #: of a step at most
+BALANCED_ERROR = 1e-9  #: error of equilibrium at which a step has converged
+MOST_ITERATIONS = 50  #: of a step at most
 WANTED_WORK = 11  #: iterations of a step, and four more for each tangent; more make the next shorter
 #: least cosine of a step to its start, greatest change of stiffness along it; else it is halved
 SMOOTH_STEP = (0.8, 0.5)
 SMOOTH_CUTS = 5  #: halvings of a step for that
-TANGENTS = 6  #: factored within a step at most
+MOST_TANGENTS = 6  #: factored within a step at most
 ROUGH_GUESS = 0.2  #: error of a first guess above which the tangent of the state before is of no use
 FIRST_RATE = 0.1  #: share of the error that an iteration is taken to leave before it is known
-PATIENCE = 15.0  #: iterations that take as long as a tangent; a new one is factored if more are likely
+ITERATIONS_OF_TANGENT = 15.0  #: iterations that take as long as a tangent; a new one is factored if more are likely
 ARC_GROWTH = (0.5, 1.5)  #: of the arc length from step to step
-CUTS = 10  #: halvings of a step, after which a path ends
-REFINEMENTS = 14  #: of the place where stability is lost
-CRITICAL = 1e-3  #: share of the smallest eigenvalue, and of the arc length, at which stability is lost
+MOST_CUTS = 10  #: halvings of a step, after which a path ends
+PLACE_REFINEMENTS = 14  #: of the place where stability is lost
+CRITICAL_SHARE = 1e-3  #: share of the smallest eigenvalue, and of the arc length, at which stability is lost
 NEARLY_SAME = (0.05, 1e-5)  #: or the share of the arc length with a relative distance of load factors
 SAME_FACTOR = 1e-7  #: relative distance of load factors that are one
 
@@ -80,7 +80,7 @@ def solve_path(
     steps : int
         At most; more where stability is lost is looked for are not counted.
     stop_factor : float, optional
-        Load factor at which a path ends; by default `MULTIPLE` times the linear buckling factor.
+        Load factor at which a path ends; by default `FACTOR_AT_END` times the linear buckling factor.
     beyond : int
         Steps after the structure has lost its stability.
     progress : Progress, optional
@@ -89,8 +89,8 @@ def solve_path(
     Returns
     -------
     Path
-        Each of its states in equilibrium to `BALANCED`. It ends after at most `steps` steps of at most `CUTS` halvings of at most
-        `ITERATIONS` iterations; `Path.ended` says why.
+        Each of its states in equilibrium to `BALANCED_ERROR`. It ends after at most `steps` steps of at most `MOST_CUTS` halvings of
+        at most `MOST_ITERATIONS` iterations; `Path.ended` says why.
 
     Raises
     ------
@@ -105,7 +105,7 @@ def solve_path(
     modes = buckling or _first_mode(factored, load)
     linear = float(modes.values[0]) if len(modes.values) else None
     case = combined_case(truss, modes.of)
-    last = stop_factor or (MULTIPLE * linear if linear else UNBUCKLED_FACTOR)
+    last = stop_factor or (FACTOR_AT_END * linear if linear else UNBUCKLED_FACTOR)
     shapes = list(imperfection_of(truss, imperfection, modes))
     factored = replace(factored, factor=None)  # as large as a tangent, of which several are kept
     found: tuple[_Walk, Imperfection] | None = None
@@ -178,7 +178,7 @@ class _Walk:
             self.soft, self.back = self._norm(here.towards), here.towards
             self.arc *= self.soft
         while self.done < self.steps:  # each turn takes a step, or the path ends
-            for cut in range(CUTS + 1):
+            for cut in range(MOST_CUTS + 1):
                 step = None  # lets go of its tangent
                 step = self._step(here, self.back, self.arc)
                 if step is not None and (cut >= SMOOTH_CUTS or self._is_smooth(here, step)):
@@ -261,14 +261,14 @@ class _Walk:
         taken, state = more * towards, here.state
         first = step = taken
         mixture, fresh, rate, error = Mixture(balance.weights), 0, 1.0, 0.0
-        for iteration in range(1, ITERATIONS + 1):
+        for iteration in range(1, MOST_ITERATIONS + 1):
             last, state = state, balance.moved(state, step, more)
             answer = balance.answer(state)
             if answer.too_far or not np.isfinite(answer.forces).all():
                 return None
             left = balance.unbalanced(state, answer)
             before, error = error, balance.error(state, answer, left)
-            if error <= BALANCED:
+            if error <= BALANCED_ERROR:
                 if to is None and product(taken, scale * first) <= 0:  # it has turned back
                     return None
                 tangent = here.tangent  # lets go of a newer one, which takes much memory
@@ -277,8 +277,8 @@ class _Walk:
                 rate = 1.0 if error > ROUGH_GUESS else FIRST_RATE
             else:
                 rate = error / before if iteration == 2 else math.sqrt(rate * error / before)
-            if rate >= 1 or math.log(BALANCED / error) < PATIENCE * math.log(rate):
-                if fresh == TANGENTS:
+            if rate >= 1 or math.log(BALANCED_ERROR / error) < ITERATIONS_OF_TANGENT * math.log(rate):
+                if fresh == MOST_TANGENTS:
                     return None
                 fresh, rate, mixture = fresh + 1, FIRST_RATE, Mixture(balance.weights)
                 before_it = here.response if last is here.state else balance.respond(last)
@@ -325,7 +325,7 @@ class _Walk:
         last: tuple[LoadedState, int, float] | None = None  # without its tangent, which takes much memory
         last_factor = here.state.factor
         kept: bool | None = None
-        for _ in range(REFINEMENTS):
+        for _ in range(PLACE_REFINEMENTS):
             share = value / (value - beyond)
             middle = low + (high - low) * min(max(share, 0.01), 0.99)
             found = self._step(here, back, middle)
@@ -347,7 +347,7 @@ class _Walk:
             found = None
             near = abs(beyond_factor - last_factor) < NEARLY_SAME[1] * abs(last_factor)
             softest = here.tangent.smallest if last is None else last[2]
-            if softest < CRITICAL * start or high - low < (NEARLY_SAME[0] if near else CRITICAL) * arc:
+            if softest < CRITICAL_SHARE * start or high - low < (NEARLY_SAME[0] if near else CRITICAL_SHARE) * arc:
                 break
         if last is not None:
             self.states.append(last[0])

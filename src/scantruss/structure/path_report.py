@@ -5,13 +5,13 @@ from __future__ import annotations
 import io
 from typing import Any
 
-from ..runtime.ours import MARK
-from .nonlinear import CUTS, PATH_STEPS
+from ..runtime.ours import MADE_BY
+from .nonlinear import MOST_CUTS, PATH_STEPS
 from .path import Path
 from .truss import Truss
 
-SECONDS = 1.5e-5  #: of a step for each displacement of a node, on a usual machine
-GROWS = 1.2  #: power of the displacements by which this grows
+SECONDS_OF_STEP = 1.5e-5  #: of a step for each displacement of a node, on a usual machine
+GROWTH_OF_STEP = 1.2  #: power of the displacements by which this grows
 EXTRA_STEPS = 10  #: that a path needs to find where stability is lost
 
 
@@ -69,11 +69,12 @@ def path_warnings(path: Path) -> list[str]:
 def path_expectation(truss: Truss, steps: int = PATH_STEPS) -> str:
     """Return a line that says how long a path may take, and computes nothing."""
     freedoms = len(truss.nodes) * (3 if truss.pinned else 6)
-    seconds = (steps + EXTRA_STEPS) * SECONDS * freedoms * max(freedoms / 3e4, 1e-2) ** (GROWS - 1)
+    seconds = (steps + EXTRA_STEPS) * SECONDS_OF_STEP * freedoms * max(freedoms / 3e4, 1e-2) ** (GROWTH_OF_STEP - 1)
     time = f"{max(seconds, 1):.0f} s" if seconds < 90 else f"{seconds / 60:.0f} min"
     return (
         f"{len(truss.nodes):,} nodes, {len(truss.members):,} members, {freedoms:,} displacements: a path of {steps} steps takes"
-        f" about {time} on a usual machine, up to twice that for a mode with both signs, up to {2**CUTS:,} shorter steps where it is hard"
+        f" about {time} on a usual machine, up to twice that for a mode with both signs, up to"
+        f" {2**MOST_CUTS:,} shorter steps where it is hard"
     )
 
 
@@ -114,5 +115,5 @@ def encode_path(path: Path) -> bytes:
     )
     axes.grid(alpha=0.3)
     stream = io.BytesIO()
-    canvas.print_png(stream, metadata={"Software": MARK})
+    canvas.print_png(stream, metadata={"Software": MADE_BY})
     return stream.getvalue()

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import words_of_number
-from .checks import CLAUSES, MemberChecks, span_of, strengths, use_words, utilizations
+from .checks import CLAUSES_CHECKED, MemberChecks, span_of, strengths, use_words, utilizations
 from .doubts import doubts_of
 from .groups import member_groups_of
 from .layers import LayerChecks, check_layers
@@ -21,7 +21,7 @@ from .results import CaseResult, Solution
 from .sizing import SizingRound
 from .truss import Truss
 
-SOFTEST = 3.0  # span over displacement, rounded, below which its number says nothing
+SOFTEST_SPAN_RATIO = 3.0  # span over displacement, rounded, below which its number says nothing
 
 
 @dataclass(frozen=True)
@@ -166,7 +166,7 @@ def report_structure(
         if each is not None and (result.state == "ULS" or not any_uls):
             more = each.max(axis=1) > worst
             worst[more], clause[more], load[more] = each.max(axis=1)[more], each.argmax(axis=1)[more], number
-    governing = tuple(f"{CLAUSES[c]}, {figures[k].name}" for c, k in zip(clause, load, strict=True))
+    governing = tuple(f"{CLAUSES_CHECKED[c]}, {figures[k].name}" for c, k in zip(clause, load, strict=True))
     warnings = [*truss.warnings, *doubts_of(truss), *notes]
     if not strength.known:
         why = "not steel" if truss.material.kind != "steel" else "of class 4 (EN 1993-1-1 table 5.2)"
@@ -211,7 +211,7 @@ def _figures_of(result: CaseResult, used: np.ndarray | None) -> CaseFigures:
         force_min=float(result.axial.min()),
         force_max=float(result.axial.max()),
         utilization_max=None if used is None else float(used.max()),
-        governing="" if most is None else f"{result.truss.member_marks[most[0]]} {CLAUSES[most[1]]}",
+        governing="" if most is None else f"{result.truss.member_marks[most[0]]} {CLAUSES_CHECKED[most[1]]}",
         equilibrium_error=result.equilibrium_error,
     )
 
@@ -232,7 +232,7 @@ def _limits(truss: Truss, figures: Sequence[CaseFigures], checks: MemberChecks) 
     span = span_of(truss)
     if span > 0 and most.displacement_max > span / checks.deflection:
         ratio = span / most.displacement_max
-        words = f"span/{ratio:.0f}, more than" if ratio > SOFTEST else "too large for a design, more than"
+        words = f"span/{ratio:.0f}, more than" if ratio > SOFTEST_SPAN_RATIO else "too large for a design, more than"
         warnings.append(
             f"the displacement of {words_of_number(1e3 * most.displacement_max, 3)} mm under {most.name} is {words}"
             f" span/{checks.deflection:g} of the span {span:.3g} m"

@@ -12,7 +12,7 @@ from ..errors import InputError
 from .frame import BEND_Y1, BEND_Z1, LENGTHEN, TWIST
 from .truss import Truss
 
-STATIONS = 9  #: places along a member, both ends included, at which forces are given
+STATIONS_OF_MEMBER = 9  #: places along a member, both ends included, at which forces are given
 #: columns of the forces in a member: N, Vy, Vz, T, My, Mz
 AXIAL_FORCE, SHEAR_Y, SHEAR_Z, TORSION, MOMENT_Y, MOMENT_Z = range(6)
 
@@ -68,11 +68,11 @@ class CaseResult:
 
     @cached_property
     def along(self) -> np.ndarray:
-        """(M, STATIONS, 6) forces along the members: N, Vy, Vz, T, My, Mz in local axes on the face towards the end [N, Nm]."""
-        share = np.linspace(0.0, 1.0, STATIONS)
+        """(M, STATIONS_OF_MEMBER, 6) forces along the members: N, Vy, Vz, T, My, Mz in local axes on the face towards the end [N, Nm]."""
+        share = np.linspace(0.0, 1.0, STATIONS_OF_MEMBER)
         length, line = self.truss.lengths[:, None], self.line[:, None, :]
         start, end = self.natural[:, None, [BEND_Y1, BEND_Z1]], self.natural[:, None, [BEND_Y1 + 1, BEND_Z1 + 1]]
-        made = np.empty((len(self.natural), STATIONS, 6))
+        made = np.empty((len(self.natural), STATIONS_OF_MEMBER, 6))
         slope, sag = length * (1 - 2 * share) / 2, length**2 * share * (1 - share) / 2
         made[:, :, AXIAL_FORCE] = self.natural[:, LENGTHEN, None] + line[:, :, 0] * slope
         made[:, :, SHEAR_Y] = -(start + end)[:, :, 1] / length + line[:, :, 1] * slope

@@ -16,7 +16,7 @@ from .results import CaseResult
 from .statics import factor_stiffness, solve
 from .truss import Truss
 
-ROUNDS = 60  #: of solving and choosing
+MOST_SIZING_ROUNDS = 60  #: of solving and choosing
 GROWTH_A_ROUND = 1.5  #: most that the lightest section grows in a round where the structure buckles too early
 
 
@@ -130,7 +130,7 @@ def _sized(truss: Truss, count: int, checks: MemberChecks, rounds: list[SizingRo
     chain = candidates(truss)
     chosen = np.zeros(len(truss.members), np.int64)
     group_of = np.arange(len(chosen)) if by == WAYS_TO_GROUP[0] else member_groups_of(truss, by)[1]
-    for _ in range(ROUNDS):
+    for _ in range(MOST_SIZING_ROUNDS):
         chosen = _few(chosen, truss.lengths, np.array([section.area for section in chain]), count)
         truss = truss.replace(sections=tuple(chain), section_of=chosen)
         factored = factor_stiffness(truss)
@@ -154,7 +154,7 @@ def _sized(truss: Truss, count: int, checks: MemberChecks, rounds: list[SizingRo
                 " use more supports or shorter members"
             )
         chosen = np.maximum(chosen, needed)
-    raise InputError(f"the sections still change after {ROUNDS} rounds; name a heavier --section")
+    raise InputError(f"the sections still change after {MOST_SIZING_ROUNDS} rounds; name a heavier --section")
 
 
 def _same_in_groups(needed: np.ndarray, group_of: np.ndarray) -> np.ndarray:

@@ -15,11 +15,12 @@ from .results import CaseResult, Solution
 from .substructures import Factor, SingularError, factor_by_parts
 from .truss import GRAVITY, LoadCase, Truss
 
-SINGULAR = 1e-12  #: smallest eigenvalue of the stiffness, its diagonal scaled to 1, at which a structure is a mechanism
-NEARLY_SINGULAR = 10 * SINGULAR  #: below which it is looked at again
-STIFF = 1e-8  #: smallest eigenvalue that is no mechanism, whatever it is exactly
-REFINED = 1e-11  #: share of the greatest load that a solution may leave
-UNSOLVED = 1e-3  #: share of a load that a factor leaves where it is none
+#: smallest eigenvalue of the stiffness, its diagonal scaled to 1, at which a structure is a mechanism
+SINGULAR_EIGENVALUE = 1e-12
+NEARLY_SINGULAR = 10 * SINGULAR_EIGENVALUE  #: below which it is looked at again
+STIFF_EIGENVALUE = 1e-8  #: smallest eigenvalue that is no mechanism, whatever it is exactly
+REFINED_RESIDUAL = 1e-11  #: share of the greatest load that a solution may leave
+UNSOLVED_RESIDUAL = 1e-3  #: share of a load that a factor leaves where it is none
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,13 +36,13 @@ class Factored:
     factor: Factor | None  #: of that; None where all is held, or it is not factored yet
 
     def solve(self, loads: np.ndarray) -> np.ndarray:
-        """Return the (F, C) free displacements of loads, refined once where they leave more than `REFINED` of the greatest load."""
+        """Return the (F, C) free displacements of loads, refined once where over `REFINED_RESIDUAL` of the greatest load is left."""
         if self.factor is None:
             return loads
         root = self.root[:, None]
         found = self.factor.solve(loads / root)
         left = loads - root * (self.scaled @ found)
-        rough = np.abs(left).max(axis=0) > REFINED * np.abs(loads).max(axis=0)
+        rough = np.abs(left).max(axis=0) > REFINED_RESIDUAL * np.abs(loads).max(axis=0)
         if rough.any():
             found[:, rough] += self.factor.solve(left[:, rough] / root)
         return found / root
@@ -75,11 +76,11 @@ def factor_stiffness(truss: Truss) -> Factored:
     if len(made.free) == 0:
         return made
     factor = _factor_of(made.scaled, made.first)
-    value, motion = (0.0, made.root) if factor is None else softest_motion(made.scaled, factor, STIFF)
+    value, motion = (0.0, made.root) if factor is None else softest_motion(made.scaled, factor, STIFF_EIGENVALUE)
     if value < NEARLY_SINGULAR:  # the factor of a matrix that is nearly singular is not to be trusted
-        shifted = (made.scaled + SINGULAR / 10 * identity(len(made.free))).tocsc()
+        shifted = (made.scaled + SINGULAR_EIGENVALUE / 10 * identity(len(made.free))).tocsc()
         value, motion = softest_motion(made.scaled, factor_by_parts(shifted, made.first))
-    if factor is None or value < SINGULAR:
+    if factor is None or value < SINGULAR_EIGENVALUE:
         everywhere = np.zeros(made.stiffness.shape[0])
         everywhere[made.free] = motion / made.root
         refuse_mechanism(truss, everywhere.reshape(len(truss.nodes), -1))
@@ -94,7 +95,9 @@ def _factor_of(matrix: csc_matrix, first: np.ndarray) -> Factor | None:
         return None
     loads = np.random.default_rng(2).standard_normal(matrix.shape[0])
     left = matrix @ factor.solve(loads) - loads
-    return factor if product(left, left) < UNSOLVED**2 * product(loads, loads) else None  # not a number is not less
+    return (
+        factor if product(left, left) < UNSOLVED_RESIDUAL**2 * product(loads, loads) else None
+    )  # not a number is not less
 
 
 def check_whole(truss: Truss) -> None:

@@ -24,7 +24,11 @@ SHARP_TURN = 40.0
 SUPPORT_WAYS = "corners, boundary, lowest:H, fixed, ends, line:NAME, loop:N"
 OTHER_WAYS = f"name others with --supports: {SUPPORT_WAYS}, a node such as N001 or a file of positions"
 SUPPORT_WORDS = ("corners", "boundary", "fixed", "ends")  #: of these, those without a value
-HELD = {"pinned": (math.inf,) * 3 + (0.0,) * 3, "fixed": (math.inf,) * 6, "roller": (0.0, 0.0, math.inf, 0.0, 0.0, 0.0)}
+HELD_BY_TYPE = {
+    "pinned": (math.inf,) * 3 + (0.0,) * 3,
+    "fixed": (math.inf,) * 6,
+    "roller": (0.0, 0.0, math.inf, 0.0, 0.0, 0.0),
+}
 
 
 def node_sets(grid: Grid) -> dict[str, np.ndarray]:
@@ -79,8 +83,8 @@ def support_stiffness(count: int, nodes: np.ndarray, kind: str) -> np.ndarray:
         stiffness: tuple[float, ...] = (quantity(value, FORCE_PER_LENGTH, "stiffness of a spring"),) * 3 + (0.0,) * 3
         if stiffness[0] <= 0:
             raise InputError(f"the stiffness of a spring must be positive, got {value}")
-    elif kind in HELD:
-        stiffness = HELD[kind]
+    elif kind in HELD_BY_TYPE:
+        stiffness = HELD_BY_TYPE[kind]
     else:
         raise InputError(f"support type must be pinned, fixed, roller or springs:K, got {kind!r}")
     supports = np.zeros((count, 6))

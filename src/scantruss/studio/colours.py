@@ -18,11 +18,11 @@ if TYPE_CHECKING:
     from .state import StudioState
 
 #: light enough to be seen on a dark page (3 to 1 on its background), dark enough on a light one, and rising in lightness
-RISING = np.array([(126, 87, 194), (74, 117, 190), (33, 145, 140), (94, 190, 88), (214, 196, 60)], float)
-DIVERGING = np.array([(178, 24, 43), (239, 138, 98), (200, 200, 200), (103, 169, 207), (33, 102, 172)], float)
-PLAIN = np.array([60, 90, 110], np.uint8)
-DIMMED = np.array([215, 218, 220], np.uint8)
-BARS = 24  #: of a histogram
+RISING_COLOURS = np.array([(126, 87, 194), (74, 117, 190), (33, 145, 140), (94, 190, 88), (214, 196, 60)], float)
+DIVERGING_COLOURS = np.array([(178, 24, 43), (239, 138, 98), (200, 200, 200), (103, 169, 207), (33, 102, 172)], float)
+PLAIN_COLOUR = np.array([60, 90, 110], np.uint8)
+DIMMED_COLOUR = np.array([215, 218, 220], np.uint8)
+HISTOGRAM_BINS = 24  #: of a histogram
 FAINT_BAR = 0.3  #: opacity of a bar that is not chosen
 BRUSHED = "between"  #: label of the field that a brushed histogram fills
 AROUND_POINT = 10  #: neighbours of which the normal of a point is made
@@ -73,14 +73,16 @@ def colors_of(
         far = max(high - middle, middle - low) or 1e-9
         low, high = middle - far, middle + far
     share = np.full(len(values), 0.5) if high <= low else (values - low) / (high - low)
-    colors = ramp(np.nan_to_num(share), RISING if middle is None else DIVERGING)
-    colors[~np.isfinite(values)] = PLAIN
+    colors = ramp(np.nan_to_num(share), RISING_COLOURS if middle is None else DIVERGING_COLOURS)
+    colors[~np.isfinite(values)] = PLAIN_COLOUR
     return colors, low, high
 
 
 def legend_of(words: str, unit: str, low: float, high: float, diverging: bool) -> ColourLegend:
     """Return the legend of a colouring between two values."""
-    stops = tuple((round(r), round(g), round(b)) for r, g, b in (DIVERGING if diverging else RISING).tolist())
+    stops = tuple(
+        (round(r), round(g), round(b)) for r, g, b in (DIVERGING_COLOURS if diverging else RISING_COLOURS).tolist()
+    )
     return ColourLegend(words, unit, (low, high), stops)
 
 
@@ -126,7 +128,7 @@ def histogram_of(
         Outside of which bars are faint.
     """
     known = np.sort(values[np.isfinite(values)])
-    counts, ends = np.histogram(known, BARS, (low, high if high > low else low + 1.0))
+    counts, ends = np.histogram(known, HISTOGRAM_BINS, (low, high if high > low else low + 1.0))
     after = np.cumsum(counts) + np.searchsorted(known, low)
     colors = color_of(0.5 * (ends[1:] + ends[:-1]))
     held = [  # by each bar: its values, or where there are none its ends
@@ -178,7 +180,7 @@ def colors_of_scan(state: StudioState, taken: np.ndarray, wanted: str) -> tuple[
         kept = sample_surface(cloud, state.settings).judged[taken] == KEPT
         red, green, blue = OUTLIER_COLOR.tolist()
         legend = ColourLegend("scan", marks=(((red, green, blue), f"outliers, {int((~kept).sum()):,} of those drawn"),))
-        return np.where(kept[:, None], PLAIN, OUTLIER_COLOR), legend
+        return np.where(kept[:, None], PLAIN_COLOUR, OUTLIER_COLOR), legend
     if wanted == FROM_GRID and grid is not None:
         places = np.ascontiguousarray(points + cloud.origin - grid.origin)
         values, _ = distances_to_grid(places, grid, float(grid.lengths.mean()))
@@ -186,7 +188,7 @@ def colors_of_scan(state: StudioState, taken: np.ndarray, wanted: str) -> tuple[
     elif wanted == "height":
         values = points[:, 2] + cloud.origin[2]
     else:
-        return np.broadcast_to(PLAIN, points.shape), None
+        return np.broadcast_to(PLAIN_COLOUR, points.shape), None
     colors, low, high = colors_of(values, None)
     return colors, legend_of(wanted, cloud.unit, low, high, False)
 

@@ -22,7 +22,7 @@ from .solving import solved_state
 from .state import NO_GRID, Design, StudioState
 from .support_places import supports_on
 
-NOTHING = 1e-9  #: distance that is none [mean member length]
+NO_DISTANCE = 1e-9  #: distance that is none [mean member length]
 LONGEST_NAME = 40  #: of a design [letters]
 
 
@@ -157,4 +157,4 @@ def deviation(grid: Grid, other: Grid) -> np.ndarray:
     places = np.ascontiguousarray(grid.nodes + grid.origin - other.origin)
     length = float(other.lengths.mean())
     distance, _ = distances_to_grid(places, other, length)
-    return np.where(distance < NOTHING * length, 0.0, distance)
+    return np.where(distance < NO_DISTANCE * length, 0.0, distance)

@@ -39,7 +39,7 @@ class Feature:
         return float(np.linalg.norm(self.points - np.array(place), axis=1).min())
 
 
-def find_features(cloud: PointCloud, settings: Settings) -> list[Feature]:
+def features_to_switch(cloud: PointCloud, settings: Settings) -> list[Feature]:
     """Return the holes and ridges of a scan, the switched off ones too.
 
     Raises
@@ -61,7 +61,7 @@ def find_features(cloud: PointCloud, settings: Settings) -> list[Feature]:
     return found
 
 
-def corners_of(cloud: PointCloud, settings: Settings) -> np.ndarray:
+def corners_of_feature(cloud: PointCloud, settings: Settings) -> np.ndarray:
     """Return the corners (C, 3) of the boundary of a scan, in its own frame [scan unit].
 
     Raises

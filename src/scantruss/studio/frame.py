@@ -13,7 +13,7 @@ DRAWN_EXTENT = 10.0  #: of the scan in the scene, whose camera is made for such 
 BESIDE_FIRST = 1.15  #: how far a second design is drawn beside the first [extent of the scan]
 POINTS_FOR_FRAME = 100_000  #: from which the extent of the bulk is measured
 ROOM_AROUND = 1.1  #: what a picture shows over what it must
-OUTSIDE = 0.005  #: share of the points that may lie beyond each side of the frame
+OUTSIDE_FRAME = 0.005  #: share of the points that may lie beyond each side of the frame
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +35,7 @@ class SceneFrame:
         """Return the frame of a scan, measured once: around the bulk of its points, without outliers."""
         if cloud not in _FRAMES:
             every = max(1, len(cloud.points) // POINTS_FOR_FRAME)
-            low, high = np.quantile(cloud.points[::every], (OUTSIDE, 1.0 - OUTSIDE), axis=0)
+            low, high = np.quantile(cloud.points[::every], (OUTSIDE_FRAME, 1.0 - OUTSIDE_FRAME), axis=0)
             extent = float((high - low).max()) or cloud.extent or 1.0
             factor = DRAWN_EXTENT / extent
             _FRAMES[cloud] = cls(cloud.origin + (low + high) / 2, factor, factor * (high - low) / 2)

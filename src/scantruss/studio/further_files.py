@@ -8,7 +8,7 @@ from ..errors import InputError
 from ..export.formats import GRID, STRUCTURE
 from ..runtime.files import temporary_folder
 from ..settings import UNITS
-from .outputs import Note, command_of, model_to_show, unsaid
+from .outputs import Note, command_of_project, model_to_show, unsaid
 from .state import StudioState
 
 SCHEDULES = "schedules .xlsx"
@@ -43,7 +43,7 @@ def further_files(state: StudioState, what: str, printed_size: float, note: Note
 
         model_to_show(state, GRID)
         assert state.grid is not None and state.cloud is not None
-        return {"grid-report.html": encode_grid_report(state.grid, state.cloud, command_of(state))}
+        return {"grid-report.html": encode_grid_report(state.grid, state.cloud, command_of_project(state))}
     return _structure_report(state, Path(what).suffix)
 
 
@@ -76,7 +76,7 @@ def _structure_report(state: StudioState, suffix: str) -> dict[str, bytes]:
 
     model = model_to_show(state, STRUCTURE)
     assert state.solution is not None and state.report is not None
-    command = command_of(state).splitlines()[-1]
+    command = command_of_project(state).splitlines()[-1]
     parts = report_parts(ReportSource("grid.json", command, state.shown_structure, state.solution, state.report))
     if suffix == ".pdf":
         return {"structure-report.pdf": encode_pdf(parts)}

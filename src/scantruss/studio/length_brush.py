@@ -23,11 +23,9 @@ if TYPE_CHECKING:
 PAINT_MODE = "paint length"
 MOST_PAINTED = 1500  #: places at which a painted length is kept
 PAINTED_SIZE = 0.14  #: of such a place that is drawn [scene]
-DAB_LENGTH, DAB_RADIUS = (
-    0.5,
-    4.0,
-)  #: of a dab where none is typed: its length, its radius [length where none is painted]
-UNSEEN = 0.01  #: opacity of the surface on which pointers are followed
+#: of a dab where none is typed: its length, its radius [length where none is painted]
+DAB_LENGTH, DAB_RADIUS = 0.5, 4.0
+UNSEEN_OPACITY = 0.01  #: opacity of the surface on which pointers are followed
 PLACE_DIGITS = 8  #: significant ones of a coordinate
 
 
@@ -136,7 +134,7 @@ class LengthBrush:
         if grid is not None:
             self._surface = self.view.scene.api.add_mesh_simple(
                 "/paint surface", self.view.frame.to_scene(grid.scan_nodes), grid.triangles.astype(np.uint32),
-                side="double", opacity=UNSEEN, cast_shadow=False, receive_shadow=False,
+                side="double", opacity=UNSEEN_OPACITY, cast_shadow=False, receive_shadow=False,
             )  # fmt: skip
             self._surface.on_drag("left")(self.view.in_order(self._dragged))
 

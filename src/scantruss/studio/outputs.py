@@ -8,7 +8,16 @@ from collections.abc import Callable
 from pathlib import Path
 
 from ..errors import InputError
-from ..export.formats import STRUCTURE, check_output, check_unit, losses, model_of, shown_otherwise, suffixes_of, write
+from ..export.formats import (
+    STRUCTURE,
+    check_model_unit,
+    check_output,
+    losses,
+    model_of,
+    shown_otherwise,
+    suffixes_of,
+    write,
+)
 from ..export.model import Model
 from ..runtime.files import temporary_folder
 from ..scan.formats.writing import write_points
@@ -47,7 +56,7 @@ def model_to_show(state: StudioState, kind: str) -> Model:
     return model_of(state.grid, cloud=state.cloud)
 
 
-def files_of(state: StudioState, kind: str, suffix: str, note: Note = unsaid) -> dict[str, bytes]:
+def output_files(state: StudioState, kind: str, suffix: str, note: Note = unsaid) -> dict[str, bytes]:
     """Return the files of a format by their names.
 
     Parameters
@@ -65,7 +74,7 @@ def files_of(state: StudioState, kind: str, suffix: str, note: Note = unsaid) ->
     model = model_to_show(state, kind)
     with temporary_folder() as folder:
         path = check_output(folder / f"{kind}{suffix}", kind)
-        check_unit(path, model.unit)
+        check_model_unit(path, model.unit)
         files = {file.name: file.read_bytes() for file in write(model, path)}
     for words in (*losses(model, path), *shown_otherwise(model, path)):
         note(words)
@@ -119,7 +128,7 @@ def settings_files(state: StudioState) -> dict[str, bytes]:
     return files
 
 
-def command_of(state: StudioState) -> str:
+def command_of_project(state: StudioState) -> str:
     """Return the command lines that repeat the grid and the structure with the files of `settings_files`."""
     name = Path(state.cloud.name).name if state.cloud is not None and state.cloud.name else "SCAN"
     made, lines = _of_the_file(state), []

@@ -17,7 +17,7 @@ from ..export.formats import model_of
 from ..export.json import encode_json, encode_model, read_grid
 from ..grid.grid import Grid
 from ..runtime.files import temporary_folder, write_files
-from ..runtime.ours import MARK
+from ..runtime.ours import MADE_BY
 from ..scan.cloud import PointCloud
 from ..settings import Settings
 from ..structure.options import StructureSettings, read_structure_settings, settings_text
@@ -25,7 +25,7 @@ from ..structure.results import Solution
 from .project_trade import TRADE_BEFORE, TRADE_HEAD, TRADE_NODES, head_of_trade, nodes_of_trade, trade_of_parts
 from .scan_parts import UP_AXES, Cleaning, WholeScan, part_of_scan, taken_of_scan
 from .state import Design, StudioState, Trade
-from .support_places import placed
+from .support_places import placed_supports
 
 PROJECT_FORMAT, PROJECT_VERSION = "scantruss-project", 5
 CLEANING_OF_PART = 3  #: last version in which a cleaning named the points of the part that was taken
@@ -49,7 +49,7 @@ def save_project(path: Path, state: StudioState) -> None:
     cloud, cleaning = whole.cloud, state.cleaning
     solved = state.grid is not None and state.solution is not None
     head = {
-        "format": PROJECT_FORMAT, "format_version": PROJECT_VERSION, "made_by": MARK,
+        "format": PROJECT_FORMAT, "format_version": PROJECT_VERSION, "made_by": MADE_BY,
         "scan": {"unit": cloud.unit, "system": cloud.system, "name": Path(cloud.name).name, "dropped": cloud.dropped,
                  "notes": list(cloud.notes), "up": whole.up, "left_out": [list(part) for part in cloud.left_out]},
         "cleaning": None if cleaning is None else [cleaning.outlier_distance, cleaning.loose_pieces, list(cleaning.crop)],
@@ -61,7 +61,7 @@ def save_project(path: Path, state: StudioState) -> None:
         "designs": [_head_of_design(each, state) for each in state.designs],
     }  # fmt: skip
     parts = {
-        "made_by.npy": _npy(np.array(MARK)),
+        "made_by.npy": _npy(np.array(MADE_BY)),
         "project.json": (json.dumps(head, indent=1, ensure_ascii=False) + "\n").encode(),
         "scan.npz": _kept(_SCANS, whole, _encode_scan),
         "structure.toml": settings_text(state.structure_settings).encode(),
@@ -207,7 +207,7 @@ def _project_of(parts: dict[str, bytes]) -> tuple[StudioState, bool]:
         trade=trade_of_parts(parts, grid, _grid_of),
         is_live=bool(head.get("quick", False)) and grid is not None,
         structure_settings=structure_settings,
-        support_places=placed(structure_settings.supports, known, grid),
+        support_places=placed_supports(structure_settings.supports, known, grid),
         solved_with=_structure_settings_of(parts["solved.toml"]) if "solved.toml" in parts else None,
         designs=tuple(
             _design_of(each, _grid_of(parts[f"design-{k}.json"]), part)

@@ -139,7 +139,7 @@ def part_of_scan(
     return replace(part, left_out=(*part.left_out, *counted), cropped=tuple(boxes.items()))
 
 
-def turned(whole: WholeScan, up: str) -> WholeScan:
+def turned_scan(whole: WholeScan, up: str) -> WholeScan:
     """Return a scan with another axis of its file upwards, turned about the origin; no reference system has such coordinates."""
     turn = np.array(UP_AXES[up], float) @ np.array(UP_AXES[whole.up], float).T
     cloud = whole.cloud

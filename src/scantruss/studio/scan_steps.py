@@ -17,7 +17,7 @@ from ..settings import Settings
 from .grid_files import changes_of_grid, is_grid_file, refuse_grid_without_scan
 from .opening import DATA_FOLDER, EXAMPLES, called, marks_of, next_free, read_whole
 from .project import read_project
-from .scan_parts import Cleaning, WholeScan, cleaning_of, part_of_scan, turned
+from .scan_parts import Cleaning, WholeScan, cleaning_of, part_of_scan, turned_scan
 from .solving import solved_again
 from .state import NO_GRID, StudioState
 from .steps import Steps
@@ -217,7 +217,7 @@ class ScanSteps(Steps):
         self.stop()
         self._turn += 1
         self._forget_features()
-        whole, usual = turned(whole, up), Settings(length=self.state.main_length)
+        whole, usual = turned_scan(whole, up), Settings(length=self.state.main_length)
         settings = self.settings.replace(
             length=usual.length, **{name: getattr(usual, name) for name in PLACED_SETTINGS}
         )

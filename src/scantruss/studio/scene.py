@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from ..grid.panels import panel_of_triangles
-from .colours import DIMMED, FROM_GRID, PLAIN, colors_of_scan
+from .colours import DIMMED_COLOUR, FROM_GRID, PLAIN_COLOUR, colors_of_scan
 from .frame import SceneFrame, SectionPlane
 from .tone import to_be_seen
 
@@ -17,23 +17,22 @@ if TYPE_CHECKING:
     from .state import StudioState
 
 FRONT_COLOR = np.array((240, 190, 90), np.uint8)
-NOWHERE, NO_TRIANGLES = np.zeros((0, 3)), np.zeros((0, 3), np.int64)
+NO_MESH, NO_TRIANGLES = np.zeros((0, 3)), np.zeros((0, 3), np.int64)
 GRID_PARTS = (
     "/grid/members", "/grid/members in points", "/grid/tubes", "/grid/nodes", "/grid/balls", "/grid/panels",
     "/grid/panels coloured",
 )  # fmt: skip
 PANEL_COLOR = (205, 216, 223)
 SELECTED_COLOR = (230, 97, 1)
-LINE_WIDTH, WIDE, FAINT = 3.0, 7.0, 1.0  #: of members, of what stands out, of what only shows where it was [pixel]
+#: of members, of what stands out, of what only shows where it was [pixel]
+LINE_WIDTH, WIDE_LINE, FAINT_LINE = 3.0, 7.0, 1.0
 TUBE_RADIUS, BALL_RADIUS = 0.05, 0.09  #: of members and nodes drawn as bodies [mean member length]
 ROD_RADIUS = 0.03  #: of members of layers, drawn so where they are too many for lines [mean member length]
 DRAWN_POINTS, FIRST_POINTS = 100_000, 20_000  #: of the scan; of its first picture
 MOST_DRAWN_LINES = 4000  #: members that are drawn as lines
 MOST_BEADS = 33_000  #: points by which so many members are drawn
-BEADS, BEAD_SIZE = (
-    (3, 12),
-    0.45,
-)  #: points of such a member at least and at most, and how large they are [their distance]
+#: points of such a member at least and at most, and how large they are [their distance]
+BEADS, BEAD_SIZE = (3, 12), 0.45
 MOST_DRAWN_RODS = 20_000  #: members of layers that are drawn as rods; more are points
 TUBE_SIDES, ROD_SIDES = 8, 3
 BODY_GAMMA, PANEL_GAMMA = 2.2, 1.45  #: exponents of colours, see `lit`
@@ -260,7 +259,7 @@ class Scene:
         if front is self._front:
             return
         if frame is None or front is None:
-            self.panels("/front", NOWHERE, NO_TRIANGLES, None, None)
+            self.panels("/front", NO_MESH, NO_TRIANGLES, None, None)
         else:
             nodes, triangles = front
             self.panels(
@@ -278,9 +277,9 @@ class Scene:
         if kind == "nodes":
             self.points("/selected/node", places[[number]], color, 0.15)
         elif kind == "members":
-            self.lines("/selected/member", places[model.members[[number]]], color, WIDE)
+            self.lines("/selected/member", places[model.members[[number]]], color, WIDE_LINE)
         else:
-            self.chain("/selected/panel", places[model.panel_loops[number]], True, SELECTED_COLOR, WIDE)
+            self.chain("/selected/panel", places[model.panel_loops[number]], True, SELECTED_COLOR, WIDE_LINE)
 
 
 def is_layered(model: Model) -> bool:
@@ -358,12 +357,12 @@ def turns_from_z(directions: np.ndarray) -> np.ndarray:
 
 def drawn_colors(colors: np.ndarray, selected: np.ndarray | None) -> np.ndarray:
     """Return colours (N, 3) with those dimmed that are not selected (N,)."""
-    return colors if selected is None else np.where(selected[:, None], colors, DIMMED)
+    return colors if selected is None else np.where(selected[:, None], colors, DIMMED_COLOUR)
 
 
 def plain_colors(count: int) -> np.ndarray:
     """Return the colour of what has no value (count, 3)."""
-    return np.broadcast_to(PLAIN, (count, 3))
+    return np.broadcast_to(PLAIN_COLOUR, (count, 3))
 
 
 def cut(section: SectionPlane | None, ends: np.ndarray, colors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..constraints.fixed_nodes import check_positions
+from ..constraints.fixed_nodes import check_fixed_positions
 from ..errors import InputError
 from ..export.model import Model
 from ..pipeline import grid_from_cloud
@@ -21,11 +21,11 @@ from ..settings import Settings
 from ..structure.options import loads_of_words
 from ..surface.samples import sample_surface
 from .compare import kept_design, taken_design
-from .features import Feature, corners_of, find_features, switched_off
-from .outputs import EFFORT_OF_PREVIEW, Note, command_of, files_of, model_to_show, unsaid
+from .features import Feature, corners_of_feature, features_to_switch, switched_off
+from .outputs import EFFORT_OF_PREVIEW, Note, command_of_project, model_to_show, output_files, unsaid
 from .solving import check_words, solved_state
 from .state import NO_GRID, StudioState
-from .support_places import placed, supports_on
+from .support_places import placed_supports, supports_on
 from .trade_steps import TradeSteps
 
 SECONDS_OF_FRONT = 0.2  #: between two pictures of a front [s]
@@ -211,7 +211,7 @@ class Session(TradeSteps):
         if known is not None and known[0] is cloud and known[1] == settings:
             return
         progress("holes and ridges", 0.5)
-        self.features = find_features(cloud, settings)
+        self.features = features_to_switch(cloud, settings)
         self._features_of = (cloud, settings)
 
     def switch(self, number: int) -> None:
@@ -228,7 +228,7 @@ class Session(TradeSteps):
         if cloud is None:
             return None
         if self._corners is None or self._corners[0] is not cloud or self._corners[1] != settings:
-            self._corners = (cloud, settings, corners_of(cloud, settings))
+            self._corners = (cloud, settings, corners_of_feature(cloud, settings))
         corners = self._corners[2]
         away = np.linalg.norm(corners - place, axis=1)
         return corners[int(away.argmin())] if len(corners) and away.min() <= settings.length / 2 else None
@@ -245,7 +245,7 @@ class Session(TradeSteps):
         if self.cloud is not None and length and not self.settings.length_field:
             kept = {tuple(place) for place in self.settings.fixed}
             new = [place for place in places if place not in kept]
-            check_positions(new, sample_surface(self.cloud, self.settings), length)
+            check_fixed_positions(new, sample_surface(self.cloud, self.settings), length)
         self.set(words, fixed=places)
 
     # ---- the structure
@@ -264,7 +264,7 @@ class Session(TradeSteps):
             given["loads"] = loads_of_words(str(given["loads"]))
         settings = self.state.structure_settings.replace(**given)
         if settings != self.state.structure_settings:
-            places = placed(settings.supports, self.state.support_places, self.grid)
+            places = placed_supports(settings.supports, self.state.support_places, self.grid)
             self.change("structure", structure_settings=settings, support_places=places)
             self.save()
 
@@ -316,8 +316,8 @@ class Session(TradeSteps):
 
     def files(self, kind: str, suffix: str, note: Note = unsaid) -> dict[str, bytes]:
         """Return the files of a format by their names; see `outputs.files_of`."""
-        return files_of(self.state, kind, suffix, note)
+        return output_files(self.state, kind, suffix, note)
 
     def command(self) -> str:
         """Return the command lines that repeat the grid and the structure."""
-        return command_of(self.state)
+        return command_of_project(self.state)

@@ -17,17 +17,17 @@ from .page_words import in_words_of_page
 from .state import DEFAULT_STRUCTURE, Placed, StudioState
 
 NODE_MARK = re.compile(r"N\d+\??")
-LOST = "?"  # after the mark of a support where the grid has no node
+LOST_SUPPORT = "?"  # after the mark of a support where the grid has no node
 
 
-def words_of(supports: str) -> list[str]:
+def words_of_supports(supports: str) -> list[str]:
     """Return what is joined by "+"."""
     return [word.strip() for word in supports.split("+") if word.strip()]
 
 
-def marks_of(supports: str) -> list[str]:
+def marks_of_supports(supports: str) -> list[str]:
     """Return the marks of nodes among supports, those that are lost too."""
-    return [word for word in words_of(supports) if NODE_MARK.fullmatch(word)]
+    return [word for word in words_of_supports(supports) if NODE_MARK.fullmatch(word)]
 
 
 def marks_of_grid(state: StudioState) -> list[str]:
@@ -57,13 +57,13 @@ def asked_supports(state: StudioState) -> tuple[np.ndarray, str]:
 
 def switched(supports: str, mark: str) -> str:
     """Return supports with a node besides, or without it where it is one of them."""
-    words = words_of(supports)
+    words = words_of_supports(supports)
     return "+".join([word for word in words if word != mark] if mark in words else [*words, mark])
 
 
-def placed(supports: str, known: Placed, grid: Grid | None) -> Placed:
+def placed_supports(supports: str, known: Placed, grid: Grid | None) -> Placed:
     """Return the place of each node that supports name: the known one, or that of the grid [scan unit]."""
-    marks = set(marks_of(supports))
+    marks = set(marks_of_supports(supports))
     kept = tuple((mark, place) for mark, place in known if mark in marks)
     new = marks - {mark for mark, _ in kept}
     if grid is None or not new:
@@ -85,10 +85,10 @@ def supports_on(state: StudioState, grid: Grid) -> dict[str, Any]:
     moved = []
     for mark, place in known:
         away = np.linalg.norm(nodes - place, axis=1)
-        there = marks[int(away.argmin())] if away.min() <= reach else mark.rstrip(LOST) + LOST
+        there = marks[int(away.argmin())] if away.min() <= reach else mark.rstrip(LOST_SUPPORT) + LOST_SUPPORT
         named.setdefault(mark, []).append(there)
         moved.append((there, place))
-    words = [each for word in words_of(asked.supports) for each in named.get(word, [word])]
+    words = [each for word in words_of_supports(asked.supports) for each in named.get(word, [word])]
     supports = "+".join(dict.fromkeys(words))
     if supports == asked.supports:
         return {}
@@ -98,7 +98,7 @@ def supports_on(state: StudioState, grid: Grid) -> dict[str, Any]:
 def words_of_lost(state: StudioState) -> str:
     """Return what is said of supports where the grid has no node; "" where each has one."""
     places = dict(state.support_places)
-    lost = [mark for mark in marks_of(state.structure_settings.supports) if mark.endswith(LOST)]
+    lost = [mark for mark in marks_of_supports(state.structure_settings.supports) if mark.endswith(LOST_SUPPORT)]
     if not lost:
         return ""
     said = [f"{mark} stood at {words_of_place(places[mark])}" if mark in places else mark for mark in lost]

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 PLANE_MODE = "mirror plane"
 PLANE_COLOR = (90, 120, 200)
 PLANE_RADIUS = 0.12  #: of the balls by which a plane is dragged [scene]
-LEANING = 0.1  #: greatest z of the normal of a plane that is dragged
-ABOVE = 1e-6  #: share of their distance that two places are apart in plan where they lie above each other
+MOST_LEANING = 0.1  #: greatest z of the normal of a plane that is dragged
+ABOVE_EACH_OTHER = 1e-6  #: share of their distance that two places are apart in plan where they lie above each other
 PLANE_REACH = 0.6  #: of a plane that is drawn, from its middle [extent of the scan]
 SYMMETRIES = ("none", *SYMMETRIES_FOUND, "typed")
 
@@ -120,7 +120,11 @@ class SymmetryTool:
         planes = [row for row in rows if len(row) != ROTATION_NUMBERS]
         if state.cloud is not None:
             self._draw(planes, SceneFrame.of(state.cloud))
-        if state.cloud is not None and len(planes) == 1 and abs(planes[0][5]) < LEANING * math.hypot(*planes[0][3:]):
+        if (
+            state.cloud is not None
+            and len(planes) == 1
+            and abs(planes[0][5]) < MOST_LEANING * math.hypot(*planes[0][3:])
+        ):
             scanned = ScannedPoints.of(state.cloud, state.settings).places
             ends = ends_on(scanned, np.array(planes[0], float), state.settings.length)
             if ends is not None:
@@ -135,7 +139,7 @@ class SymmetryTool:
         faces = np.array([[0, 1, 2], [0, 2, 3]], np.uint32)
         for k, plane in enumerate(planes):
             self.view.scene.api.add_mesh_simple(
-                f"/mirror/{k}", corners_of(frame, np.array(plane, float)), faces, color=PLANE_COLOR, side="double", opacity=0.25,
+                f"/mirror/{k}", corners_of_plane(frame, np.array(plane, float)), faces, color=PLANE_COLOR, side="double", opacity=0.25,
                 flat_shading=True, cast_shadow=False, receive_shadow=False,
             )  # fmt: skip
 
@@ -150,7 +154,7 @@ def upright_plane(begin: np.ndarray, end: np.ndarray) -> tuple[float, ...]:
     """
     across = np.array([begin[1] - end[1], end[0] - begin[0], 0.0])
     size = float(np.linalg.norm(across))
-    if size < ABOVE * float(np.linalg.norm(end - begin)) or size == 0.0:
+    if size < ABOVE_EACH_OTHER * float(np.linalg.norm(end - begin)) or size == 0.0:
         raise InputError("a mirror plane needs two places that do not lie above each other")
     return tuple(float(f"{number:.9g}") for number in (*begin.tolist(), *(across / size).tolist()))
 
@@ -167,7 +171,7 @@ def ends_on(places: np.ndarray, plane: np.ndarray, length: float) -> np.ndarray 
     return ends - ((ends - plane[:3]) @ normal)[:, None] * normal
 
 
-def corners_of(frame: SceneFrame, plane: np.ndarray) -> np.ndarray:
+def corners_of_plane(frame: SceneFrame, plane: np.ndarray) -> np.ndarray:
     """Return the corners (4, 3) of a plane as it is drawn around the middle of the scan, float32."""
     normal = plane[3:] / np.linalg.norm(plane[3:])
     at = frame.to_scene(plane[None, :3])[0].astype(float)

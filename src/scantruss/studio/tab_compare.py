@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .colouring import PLAIN_GRID, DrawnDesign
-from .colours import PLAIN, colors_of, legend_of
+from .colours import PLAIN_COLOUR, colors_of, legend_of
 from .compare import comparison, deviation, drawn_design, kept_design
 from .frame import BESIDE_FIRST, DRAWN_EXTENT
 from .scene import drawn_colors
@@ -148,7 +148,7 @@ class CompareTab:
             colors[scale.choice["kind"]] = drawn_colors(scale.colors(values), self.view.look.selected(values))
             legend = scale.legend(f"{chosen.name}: ") if self.is_over else None  # else the one of both
         self.view.legends.show("beside", legend)
-        scene.lines("/beside/members", nodes[members], colors.get("members", PLAIN))
+        scene.lines("/beside/members", nodes[members], colors.get("members", PLAIN_COLOUR))
         if "nodes" in colors:
             size = 0.2 * frame.factor * float(grid.lengths.mean())
             scene.points("/beside/nodes", nodes, np.ascontiguousarray(colors["nodes"]), size)

@@ -9,7 +9,7 @@ import numpy as np
 from ..grid.panels import panel_of_triangles
 from .certificate_list import CertificateList
 from .colouring import BY_LENGTH, PLAIN_GRID, DrawnDesign, SharedScale, choices_of
-from .colours import BRUSHED, DIMMED, histogram_of
+from .colours import BRUSHED, DIMMED_COLOUR, histogram_of
 from .drawn_lines import numbers_of
 from .frame import SectionPlane
 from .legend import ColourLegend
@@ -17,7 +17,7 @@ from .pictures import PictureTool
 from .scale import round_ends, set_scale
 from .scene import (
     BALL_RADIUS,
-    FAINT,
+    FAINT_LINE,
     GRID_PARTS,
     LINE_WIDTH,
     MOST_DRAWN_LINES,
@@ -184,10 +184,10 @@ class GridTab:
         is_faint = self.view.structure.is_moved or self.view.compare.is_over
         self.view.legends.show("grid", None if is_faint or is_reference else legend)
         if self.view.structure.is_moved:
-            of_members = np.broadcast_to(DIMMED, of_members.shape)
+            of_members = np.broadcast_to(DIMMED_COLOUR, of_members.shape)
             self.count.content = "grey as built, while the Structure tab shows a displaced shape"
         elif self.view.compare.is_over:
-            of_members = np.broadcast_to(DIMMED, of_members.shape)
+            of_members = np.broadcast_to(DIMMED_COLOUR, of_members.shape)
             self.count.content = "grey, while Compare draws another design over it"
         elif is_reference:
             self.count.content = "plain, while Compare colours another design by its distance from this one"
@@ -197,7 +197,7 @@ class GridTab:
         lines = lines and not as_rods
         scene.members(
             "/grid/members", ends if lines else ends[:0], of_members if lines else of_members[:0],
-            FAINT if is_faint else LINE_WIDTH, None if for_picture else MOST_DRAWN_LINES,
+            FAINT_LINE if is_faint else LINE_WIDTH, None if for_picture else MOST_DRAWN_LINES,
         )  # fmt: skip
         radius, sides = (ROD_RADIUS, ROD_SIDES) if as_rods else (TUBE_RADIUS, TUBE_SIDES)
         in_space = bodies or as_rods

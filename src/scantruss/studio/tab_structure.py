@@ -14,7 +14,7 @@ from ..structure.build import scale_of
 from ..structure.groups import WAYS_TO_GROUP
 from ..structure.options import loads_of_words
 from ..structure.report_lines import node_lines, sizing_lines
-from ..structure.supports import HELD
+from ..structure.supports import HELD_BY_TYPE
 from .colours import colors_of, legend_of
 from .compare import structure_figures
 from .frame import DRAWN_EXTENT
@@ -44,7 +44,7 @@ NO_LOAD = 1e-9  #: share of the greatest load of a node up to which another has 
 ARROW_WIDTH = 2.0  #: of a load [pixel]
 SUPPORT_RADIUS = 0.09  #: of a support that is drawn [scene]
 ANIMATION_SECONDS, FRAME_SECONDS = 6.0, 0.08  #: of a mode that is shown [s]
-SWINGS = 3  #: of a mode while it is shown
+SWINGS_OF_MODE = 3  #: of a mode while it is shown
 AROUND_CLICK = 0.03  #: of a node that a click means to support [rad]
 AS_BUILT = "as built"
 SUPPORT_MODE = "place support"
@@ -69,7 +69,7 @@ class StructureTab:
         self._asked: tuple[Any, ...] = ()  # of which the nodes and words that follow are
         self._held, self._why_none = np.zeros(0, np.int64), ""
         self.words |= {
-            "support_type": gui.add_dropdown("held as", tuple(HELD), initial_value=kept.support_type),
+            "support_type": gui.add_dropdown("held as", tuple(HELD_BY_TYPE), initial_value=kept.support_type),
             "section": gui.add_text("section", kept.section),
         }
         self.sized = gui.add_markdown("", visible=False)
@@ -369,7 +369,7 @@ class StructureTab:
         while (spent := time.monotonic() - began) < ANIMATION_SECONDS:
             if scene.get_handle_by_name("/moved") is not handle:  # another shape is drawn meanwhile
                 return
-            swing = np.float32(np.sin(2 * np.pi * SWINGS * spent / ANIMATION_SECONDS))
+            swing = np.float32(np.sin(2 * np.pi * SWINGS_OF_MODE * spent / ANIMATION_SECONDS))
             with contextlib.suppress(RuntimeError):  # of one that has just been removed
                 handle.points = (places + swing * step)[members]
             time.sleep(FRAME_SECONDS)

@@ -10,7 +10,7 @@ from ..grid.alike import JOINTS, LENGTHS
 from ..layouts.joints_alike import few_joints
 from ..layouts.on_scan import ScanOfGrid
 from ..layouts.panels_alike import few_panels
-from ..layouts.trade import COUNTS, Traded, traded_kinds, traded_lengths
+from ..layouts.trade import COUNTS_TRIED, Traded, traded_kinds, traded_lengths
 from ..runtime.progress import Progress
 from .scan_steps import ScanSteps
 from .state import Trade
@@ -63,10 +63,10 @@ class TradeSteps(ScanSteps):
             off = scan.farthest_node(before) / float(before.lengths.mean())
             if parts == LENGTHS:
                 traded: list[Traded] = []
-                for done, count in enumerate(COUNTS):
+                for done, count in enumerate(COUNTS_TRIED):
 
                     def report(stage: str, share: float, done: int = done) -> None:
-                        progress(stage, (done + share) / len(COUNTS))
+                        progress(stage, (done + share) / len(COUNTS_TRIED))
 
                     traded += traded_lengths(before, tolerance, (count,), scan.farthest_node, report)
                     keep(traded, off)

@@ -45,6 +45,7 @@ from .size_field import length_field
 from .supports import support_samples
 
 BESIDE_SAMPLES = 1.5  # distance from points of the boundary within which all points are used [`sample_spacing`]
+BROAD_PASSES = 4  # times that normals are averaged with those beside them for the sheet as a whole
 WITHOUT_COORDINATES = "with NaN or infinite coordinates"  # why points are not read
 POINTS_OF_KEPT_SAMPLES = (
     500_000  # points of a cloud with which samples of several settings are kept, that often; else the last ones
@@ -86,6 +87,11 @@ class SurfaceSamples:
     rings: tuple[LimbRing, ...] = ()  #: where limbs too thin for a grid were cut off
     #: (2, 3) the box around the points that were not read since a crop left them out, by its words, in the scan's own frame
     cropped: tuple[tuple[str, np.ndarray], ...] = ()
+
+    def __repr__(self) -> str:
+        """Say how many samples and pieces there are."""
+        found = f"{len(self.surface.mean):,} samples of {len(self.scan):,} points"
+        return f"SurfaceSamples({found}, pieces {len(self.pieces)}, area {self.area:.4g} {self.unit or 'unit'}^2)"
 
     @property
     def outliers(self) -> int:
@@ -270,10 +276,10 @@ def distance_from_scan(surface: Surface, place: np.ndarray) -> float:
     return float(np.sqrt(best))
 
 
-def broad_normals(surface: Surface, passes: int = 4) -> np.ndarray:
+def broad_normals(surface: Surface) -> np.ndarray:
     """Return normals averaged over about a member (S, 3): those of the sheet as a whole if the scan is rough or overgrown."""
     normals = surface.normals
-    for _ in range(passes):
+    for _ in range(BROAD_PASSES):
         normals = mean_normals(normals, surface.neighbors, 0.0)
     return normals
 

@@ -19,17 +19,19 @@ if TYPE_CHECKING:
     from ...grid.grid import Grid
     from ...scan.cloud import PointCloud
 
-RED, VIOLET, AMBER = np.array([0.80, 0.10, 0.10]), np.array([0.45, 0.25, 0.65]), np.array([0.85, 0.55, 0.05])
-COLOURS = {
-    "far": RED,
-    "pieces": VIOLET,
-    "not chosen": VIOLET,
-    "rods": VIOLET,
-    "limbs": VIOLET,
-    "slits": VIOLET,
-    "floor": VIOLET,
-    "outliers": AMBER,
-    "sparse": AMBER,
+OUT_OF_REACH_COLOUR = np.array([0.80, 0.10, 0.10])
+NO_GRID_COLOUR = np.array([0.45, 0.25, 0.65])
+LEFT_OUT_COLOUR = np.array([0.85, 0.55, 0.05])
+COLOUR_OF_PART = {
+    "far": OUT_OF_REACH_COLOUR,
+    "pieces": NO_GRID_COLOUR,
+    "not chosen": NO_GRID_COLOUR,
+    "rods": NO_GRID_COLOUR,
+    "limbs": NO_GRID_COLOUR,
+    "slits": NO_GRID_COLOUR,
+    "floor": NO_GRID_COLOUR,
+    "outliers": LEFT_OUT_COLOUR,
+    "sparse": LEFT_OUT_COLOUR,
 }
 
 
@@ -77,8 +79,8 @@ def shown_points(grid: Grid, cloud: PointCloud) -> Shown:
     for kind, groups in kinds.items():
         which = np.concatenate(groups)
         left[which] = True
-        if kind in COLOURS:
+        if kind in COLOUR_OF_PART:
             words = f"{len(which):,} points: {KINDS_LEFT_OUT[kind]}"
-            missed.append(Missed(words, points[which], COLOURS[kind], kind not in ("outliers", "sparse")))
+            missed.append(Missed(words, points[which], COLOUR_OF_PART[kind], kind not in ("outliers", "sparse")))
     unread = tuple(f"{count:,} points: {words}, not shown" for words, count in samples.unread)
     return Shown(points[~left], tuple(missed), unread)

@@ -11,12 +11,15 @@ import numpy as np
 from ...errors import Place, words_of_number
 from ...grid.grid import Grid
 from .camera import Camera
-from .strokes import INK
+from .strokes import INK_COLOUR
 
-FAULT, WARNING = np.array([0.78, 0.05, 0.10]), np.array([0.80, 0.45, 0.00])  # colours of marks
+FAULT_COLOUR, WARNING_SIGN_COLOUR = np.array([0.78, 0.05, 0.10]), np.array([0.80, 0.45, 0.00])  # colours of marks
 MOST_MARKS = 5  # marks of a kind in a picture
-LINE, SIGN, LETTER = 1.6, 1.4, 0.62  # of a legend: from line to line, of a sign, of a letter on average at most [em]
-LEAST = 0.2  # share of the width and height of a picture that is left to the grid however long the legend is
+# of a legend: from line to line, of a sign, of a letter on average at most [em]
+LEGEND_LINE, LEGEND_SIGN, LEGEND_LETTER = 1.6, 1.4, 0.62
+LEAST_LEFT_BY_LEGEND = (
+    0.2  # share of the width and height of a picture that is left to the grid however long the legend is
+)
 BAR_SHARE = 0.18  # largest share of the width that a scale bar takes
 
 
@@ -28,7 +31,7 @@ class Text(NamedTuple):
     words: str
     size: float  #: [pixel]
     align: str = "center"
-    colour: np.ndarray = INK  #: (3,)
+    colour: np.ndarray = INK_COLOUR  #: (3,)
 
 
 class Row(NamedTuple):
@@ -36,7 +39,7 @@ class Row(NamedTuple):
 
     words: str
     sign: str = ""  #: before them; without it the line is a heading or a remark
-    colour: np.ndarray = INK  #: (3,) of the sign, or of a line without one
+    colour: np.ndarray = INK_COLOUR  #: (3,) of the sign, or of a line without one
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,8 +55,8 @@ class Legend:
         """The legend as words in the picture."""
         (x, y), em, texts = self.corner, self.em, []
         for number, row in enumerate(self.rows):
-            at = y - number * LINE * em
-            words = Text(x + SIGN * em, at, row.words, em, "left")
+            at = y - number * LEGEND_LINE * em
+            words = Text(x + LEGEND_SIGN * em, at, row.words, em, "left")
             texts += [Text(x, at, row.sign, em, "left", row.colour), words] if row.sign else []
             texts += [] if row.sign else [Text(x, at, row.words, em, "left", row.colour)]
         return texts
@@ -65,11 +68,11 @@ class Legend:
         if not self.rows:
             return [box]
         left, bottom, right, top = box
-        wide = SIGN + LETTER * max(len(row.words) for row in self.rows)
-        end = self.corner[1] - (len(self.rows) * LINE + 0.4) * self.em
-        below = (left, bottom, right, max(min(top, end), bottom + LEAST * (top - bottom)))
+        wide = LEGEND_SIGN + LEGEND_LETTER * max(len(row.words) for row in self.rows)
+        end = self.corner[1] - (len(self.rows) * LEGEND_LINE + 0.4) * self.em
+        below = (left, bottom, right, max(min(top, end), bottom + LEAST_LEFT_BY_LEGEND * (top - bottom)))
         beside = (self.corner[0] + (wide + 2.0) * self.em, bottom, right, top)
-        fits = alone and right - beside[0] > LEAST * (right - left)
+        fits = alone and right - beside[0] > LEAST_LEFT_BY_LEGEND * (right - left)
         return [below, beside] if fits else [below]
 
 
@@ -93,19 +96,19 @@ class Mark:
     also: tuple[Place, ...] = ()  #: more such places
 
 
-def marks_of(grid: Grid) -> list[Mark]:
+def places_marked(grid: Grid) -> list[Mark]:
     """Return the places of faults and warnings; where there are none, the worst members and the worst angle."""
     found = grid.certificate
     if found is None:
         return []
     marks = []
-    for kind, colour in ((found.faults, FAULT), (found.warnings, WARNING)):
+    for kind, colour in ((found.faults, FAULT_COLOUR), (found.warnings, WARNING_SIGN_COLOUR)):
         placed = [Mark(fault.words, fault.where, colour, fault.also) for fault in kind if fault.where is not None]
         marks += placed[:MOST_MARKS]
     warned = {mark.where for mark in marks}
     unit = f" {grid.unit}" if grid.unit else ""
     marks += [
-        Mark(f"{part.words}, {words_of_number(part.size or 0.0, 3)}{unit} across", part.where, INK)
+        Mark(f"{part.words}, {words_of_number(part.size or 0.0, 3)}{unit} across", part.where, INK_COLOUR)
         for part in found.left_out
         if part.kind in ("hole", "gap") and part.where is not None and part.where not in warned
     ]
@@ -115,7 +118,7 @@ def marks_of(grid: Grid) -> list[Mark]:
         ("smallest angle", found.smallest_angle, " degrees"),
     )
     return marks or [
-        Mark(f"{name}, {words_of_number(figure.value, 3)}{words}", figure.where, INK)
+        Mark(f"{name}, {words_of_number(figure.value, 3)}{words}", figure.where, INK_COLOUR)
         for name, figure, words in worst
         if figure
     ]

@@ -17,16 +17,16 @@ from ...errors import words_of_number
 from ...grid.grid import Grid
 from ...grid.upward import known_upward
 from ...runtime.files import write_files
-from ...runtime.ours import MARK
+from ...runtime.ours import MADE_BY
 from ...runtime.places import check_place
 from ...scan.cloud import PointCloud
 from .camera import Camera, choose_camera
 from .left_out import Shown, shown_points
-from .legend import FAULT, Legend, Ring, Row, Text, marks_of, scale_bar
+from .legend import FAULT_COLOUR, Legend, Ring, Row, Text, places_marked, scale_bar
 from .strokes import (
-    INK,
+    INK_COLOUR,
     MOST_POINTS,
-    PAPER,
+    PAPER_COLOUR,
     Strokes,
     cloud_strokes,
     dot_strokes,
@@ -111,7 +111,7 @@ def plot_grid(grid: Grid, cloud: PointCloud | None, views: tuple[str, ...], size
 
 def _rings(grid: Grid, camera: Camera, em: float, texts: list[Text]) -> list[Ring]:
     """Return rings at the places to look at, and add their numbers to the texts."""
-    marks = marks_of(grid)
+    marks = places_marked(grid)
     if not marks:
         return []
     flat, _ = camera.project(np.array([mark.where for mark in marks]) - grid.origin)
@@ -128,10 +128,10 @@ def _rings(grid: Grid, camera: Camera, em: float, texts: list[Text]) -> list[Rin
 def _legend_rows(grid: Grid, shown: Shown | None) -> list[Row]:
     """Return what colours and numbers mean, line by line."""
     failed = grid.certificate is not None and not grid.certificate.passed
-    rows = [Row("This grid fails its certificate:", "", FAULT)] * failed
+    rows = [Row("This grid fails its certificate:", "", FAULT_COLOUR)] * failed
     rows += [Row(part.words, "\u25cf", part.colour) for part in (shown.missed if shown else ())]
     rows += [Row(words) for words in (shown.unread if shown else ())]
-    return rows + [Row(mark.words, str(number), mark.colour) for number, mark in enumerate(marks_of(grid), 1)]
+    return rows + [Row(mark.words, str(number), mark.colour) for number, mark in enumerate(places_marked(grid), 1)]
 
 
 def encode_cloud(cloud: PointCloud) -> bytes:
@@ -218,14 +218,14 @@ def paint(
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(size[0] / 100, size[1] / 100), dpi=100, facecolor=tuple(PAPER))
+    figure = Figure(figsize=(size[0] / 100, size[1] / 100), dpi=100, facecolor=tuple(PAPER_COLOUR))
     canvas: Any = FigureCanvasAgg(figure)
     axes: Any = figure.add_axes((0, 0, 1, 1), xlim=(0, size[0]), ylim=(0, size[1]), autoscale_on=False)
     axes.set_axis_off()
     if strokes:
         axes.add_collection(_collection(strokes), autolim=False)
     for line in lines:
-        axes.plot(*line.T, color=tuple(INK), linewidth=1.5, solid_capstyle="butt", solid_joinstyle="miter")
+        axes.plot(*line.T, color=tuple(INK_COLOUR), linewidth=1.5, solid_capstyle="butt", solid_joinstyle="miter")
     for ring in rings:
         axes.plot([ring.x], [ring.y], "o", markersize=0.72 * ring.size, markeredgecolor=tuple(ring.colour),
                   markerfacecolor="none", markeredgewidth=1.6)  # fmt: skip
@@ -233,7 +233,7 @@ def paint(
         axes.text(text.x, text.y, text.words, fontsize=text.size * 0.72, color=tuple(text.colour), ha=text.align,
                   va="center", family="DejaVu Sans", parse_math=False)  # fmt: skip
     stream = io.BytesIO()
-    canvas.print_png(stream, metadata={"Software": MARK})  # unlike savefig it asks no settings of the user
+    canvas.print_png(stream, metadata={"Software": MADE_BY})  # unlike savefig it asks no settings of the user
     return stream.getvalue()
 
 

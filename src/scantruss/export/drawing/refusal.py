@@ -8,7 +8,7 @@ import numpy as np
 
 from ...errors import FrontError
 from ...scan.cloud import PointCloud
-from .legend import FAULT, Ring, Text
+from .legend import FAULT_COLOUR, Ring, Text
 from .picture import PICTURE_SIZE, encode_picture, paint
 from .strokes import cloud_strokes, oblique_view
 from .style import PictureStyle
@@ -33,11 +33,13 @@ def encode_refusal(error: FrontError, cloud: PointCloud, *, style: PictureStyle 
     size = (style.size if style else None) or PICTURE_SIZE
     em = 22.0 * min(size[0] / PICTURE_SIZE[0], size[1] / PICTURE_SIZE[1])  # height of the letters
     lines = wrap(str(error), LINE_CHARACTERS)
-    texts = [Text(2 * em, size[1] - (2 + 1.6 * k) * em, words, em, "left", FAULT) for k, words in enumerate(lines)]
+    texts = [
+        Text(2 * em, size[1] - (2 + 1.6 * k) * em, words, em, "left", FAULT_COLOUR) for k, words in enumerate(lines)
+    ]
     below = size[0], round(size[1] - (2 + 1.6 * len(lines)) * em)
     rings = []
     if error.where is not None:
         place = np.array([error.where]) - cloud.origin
         ((x, y),), _ = oblique_view(cloud, below)(place)
-        rings = [Ring(float(x), float(y), 1.6 * em, FAULT), Ring(float(x), float(y), 3.2 * em, FAULT)]
+        rings = [Ring(float(x), float(y), 1.6 * em, FAULT_COLOUR), Ring(float(x), float(y), 3.2 * em, FAULT_COLOUR)]
     return paint(size, [cloud_strokes(cloud, below)], texts, rings)

@@ -12,17 +12,17 @@ from ...scan.cloud import PointCloud
 from .camera import Camera, map_depth
 
 MOST_POINTS = {True: 40_000, False: 120_000}  #: of the scan that are drawn, over a grid and alone
-PAPER = np.array([0.984, 0.980, 0.969])  # background
-GROUND = np.array([0.925, 0.918, 0.898])  # shadow on the ground
-INK = np.array([0.098, 0.180, 0.290])  # members
+PAPER_COLOUR = np.array([0.984, 0.980, 0.969])  # background
+GROUND_COLOUR = np.array([0.925, 0.918, 0.898])  # shadow on the ground
+INK_COLOUR = np.array([0.098, 0.180, 0.290])  # members
 BOUNDARY_COLOR = np.array([0.047, 0.098, 0.176])  # members on a boundary
 OUTSIDE_SHADES = (
     np.array([0.345, 0.525, 0.620]),
     np.array([0.835, 0.925, 0.930]),
 )  # triangles in the shade, in the light
 INSIDE_SHADES = (np.array([0.560, 0.470, 0.390]), np.array([0.930, 0.870, 0.780]))  # seen from their other side
-CLAY = (np.array([0.130, 0.165, 0.220]), np.array([0.640, 0.690, 0.720]))  # a scan
-PRINT = (np.array([0.520, 0.170, 0.090]), np.array([0.990, 0.640, 0.420]))  # a printed model
+CLAY_COLOURS = (np.array([0.130, 0.165, 0.220]), np.array([0.640, 0.690, 0.720]))  # a scan
+PRINT_COLOURS = (np.array([0.520, 0.170, 0.090]), np.array([0.990, 0.640, 0.420]))  # a printed model
 FIXED_NODE_COLOUR = np.array([0.851, 0.290, 0.180])  # fixed nodes
 COLOUR_BEHIND = 0.25  # how much of its colour is left to what lies behind the grid
 
@@ -112,7 +112,7 @@ def _hazy(colour: np.ndarray, fade: np.ndarray, most: float) -> np.ndarray:
     """Return (N, 4) colours that go towards the paper by up to `most` far back."""
     colour = np.broadcast_to(np.concatenate([colour, [1.0]]) if colour.ndim == 1 else colour, (len(fade), 4)).copy()
     share = (most * fade)[:, None]
-    colour[:, :3] = (1 - share) * colour[:, :3] + share * PAPER
+    colour[:, :3] = (1 - share) * colour[:, :3] + share * PAPER_COLOUR
     return colour
 
 
@@ -140,7 +140,7 @@ def fallen_shadow(nodes: np.ndarray, triangles: np.ndarray, camera: Camera) -> n
 def shadow_strokes(nodes: np.ndarray, triangles: np.ndarray, camera: Camera) -> Strokes:
     """Return the shadow that a surface casts on the ground below it."""
     shape = camera.project(fallen_shadow(nodes, triangles, camera))[0][triangles]
-    colour = np.broadcast_to(np.concatenate([GROUND, [1.0]]), (len(shape), 4))
+    colour = np.broadcast_to(np.concatenate([GROUND_COLOUR, [1.0]]), (len(shape), 4))
     return Strokes(np.full(len(shape), -np.inf), shape, colour, colour, np.full(len(shape), 0.8))
 
 
@@ -185,7 +185,7 @@ def _member_strokes(grid: Grid, view: CameraView) -> Strokes:
     width = float(np.clip(0.055 * np.quantile(length, 0.75), 0.4, 2.4))
     fade = view.fade(near[ends].mean(axis=1))
     bold = boundary | grid.edge_on_line
-    colour = np.where(bold[:, None], _hazy(BOUNDARY_COLOR, fade, 0.45), _hazy(INK, fade, 0.60))
+    colour = np.where(bold[:, None], _hazy(BOUNDARY_COLOR, fade, 0.45), _hazy(INK_COLOUR, fade, 0.60))
     widths = np.where(bold, 1.9 * width, width)
     return Strokes(key + 1e-9 * view.camera.distance, flat[ends[:, [0, 1, 1]]], np.zeros_like(colour), colour, widths)
 
@@ -215,7 +215,9 @@ def dot_strokes(points: np.ndarray, member: float, view: CameraView, *, over: bo
     on = (triangle >= 0) & (near < nearest + slack)
     key = np.where(on, np.maximum(view.key[triangle], near), near) + slack
     light = np.where(triangle >= 0, view.light[triangle], 0.5)
-    colour = _hazy(_mix((INK, OUTSIDE_SHADES[0]), light, 0.55) if over else _mix(CLAY, light), view.fade(near), 0.30)
+    colour = _hazy(
+        _mix((INK_COLOUR, OUTSIDE_SHADES[0]), light, 0.55) if over else _mix(CLAY_COLOURS, light), view.fade(near), 0.30
+    )
     return Strokes(key, _dots(flat), np.zeros_like(colour), colour, np.full(len(key), 1.5 if over else 2.4))
 
 
@@ -268,7 +270,7 @@ def cloud_strokes(cloud: PointCloud, size: tuple[int, int]) -> Strokes:
     points = some_of(cloud.points, MOST_POINTS[False])
     flat, depth = oblique_view(cloud, size)(points)
     height = points[:, 2] - points[:, 2].min()
-    colour = _mix(CLAY, height / max(float(height.max()), 1e-300), 0.8)
+    colour = _mix(CLAY_COLOURS, height / max(float(height.max()), 1e-300), 0.8)
     return Strokes(-depth, _dots(flat), np.zeros_like(colour), colour, np.full(len(flat), 2.0))
 
 
@@ -285,7 +287,7 @@ def _mark_strokes(grid: Grid, view: CameraView) -> list[Strokes]:
     seen = near > nearest - 0.5 * float(np.mean(grid.lengths))
     shape = _dots(flat)
     strokes = []
-    for colour, width in ((PAPER, 15.0), (FIXED_NODE_COLOUR, 11.0)):
+    for colour, width in ((PAPER_COLOUR, 15.0), (FIXED_NODE_COLOUR, 11.0)):
         shown = np.broadcast_to(np.concatenate([colour, [1.0]]), (len(flat), 4)).copy()
         shown[:, 3] = np.where(seen, 1.0, COLOUR_BEHIND)
         front = np.full(len(flat), np.inf)
@@ -295,6 +297,6 @@ def _mark_strokes(grid: Grid, view: CameraView) -> list[Strokes]:
 
 def solid_strokes(view: CameraView) -> Strokes:
     """Return the outside of a solid, shaded."""
-    surface = _surface_strokes(view, PRINT, PRINT)
+    surface = _surface_strokes(view, PRINT_COLOURS, PRINT_COLOURS)
     keep = view.outside
     return Strokes(surface.key[keep], surface.shape[keep], surface.fill[keep], surface.line[keep], surface.width[keep])

@@ -11,10 +11,10 @@ from typing import Any, cast
 import numpy as np
 
 from ...grid.upward import AGAINST_GRAVITY
-from ...runtime.ours import MARK
+from ...runtime.ours import MADE_BY
 from ...structure.truss import Truss
 from .camera import choose_camera
-from .strokes import INK, PAPER, look
+from .strokes import INK_COLOUR, PAPER_COLOUR, look
 
 FORCES, USED, MOVED, SIZES = "forces", "utilization", "displacements", "sizes"  #: scales of colours
 COLOUR_SCALES = {
@@ -23,11 +23,11 @@ COLOUR_SCALES = {
     SIZES: ("#bcc7cd", "#86b4bd", "#2f7fa0", "#14355e"),
     MOVED: ("#aab4ba", "#74a98f", "#e0a33a", "#a8321c"),
 }
-OVERUSED = "#d81e2c"  #: colour of a utilization over 1
+OVERUSED_COLOUR = "#d81e2c"  #: colour of a utilization over 1
 MEMBER_PICTURE = (1500, 940)  #: size of a picture of members [pixel]
 MOST_VECTORS = 8000  #: lines and triangles of a picture in a PDF; more are drawn as pixels
-NOTES = 18  #: height of the notes below a picture [pixel]
-STILL = np.array([0.72, 0.73, 0.74, 1.0])  #: colour of members where they were before they moved
+NOTES_HEIGHT = 18  #: height of the notes below a picture [pixel]
+UNMOVED_COLOUR = np.array([0.72, 0.73, 0.74, 1.0])  #: colour of members where they were before they moved
 SHELL_SHADES = np.array([0.80, 0.985])  #: grey of triangles in the shade and in the light
 DRAWN_MOVE = 0.06  #: size of the greatest displacement in a picture over that of the structure
 WEBP_QUALITY = 78  #: of a picture within a page
@@ -95,8 +95,10 @@ def encode_structure_picture(truss: Truss, shown: MemberPicture, size: tuple[int
     from matplotlib.figure import Figure
 
     with drawing_defaults():
-        figure = Figure(figsize=(size[0] / 100, size[1] / 100), dpi=100, facecolor=tuple(PAPER))
-        figure.text(0.5, 0.965, shown.title, ha="center", va="center", fontsize=13, color=tuple(INK), parse_math=False)
+        figure = Figure(figsize=(size[0] / 100, size[1] / 100), dpi=100, facecolor=tuple(PAPER_COLOUR))
+        figure.text(
+            0.5, 0.965, shown.title, ha="center", va="center", fontsize=13, color=tuple(INK_COLOUR), parse_math=False
+        )
         draw_members(figure, (0.01, 0.01, 0.98, 0.92), truss, shown)
         return png_of(figure)
 
@@ -107,7 +109,7 @@ def png_of(figure: Any) -> bytes:
 
     stream = io.BytesIO()
     canvas: Any = FigureCanvasAgg(figure)
-    canvas.print_png(stream, metadata={"Software": MARK})
+    canvas.print_png(stream, metadata={"Software": MADE_BY})
     return stream.getvalue()
 
 
@@ -135,10 +137,12 @@ def draw_members(figure: Any, place: tuple[float, float, float, float], truss: T
     nodes = truss.nodes if shown.moves is None else truss.nodes + shown.factor * shown.moves
     camera = choose_camera(truss.nodes, truss.triangles, AGAINST_GRAVITY)
     margin = 0.03 * size[0]
-    box = (margin, margin + NOTES, size[0] - margin, size[1] - margin)
+    box = (margin, margin + NOTES_HEIGHT, size[0] - margin, size[1] - margin)
     camera = camera.framed(np.concatenate([truss.nodes, nodes]), box)
     colours = LinearSegmentedColormap.from_list(shown.colours, COLOUR_SCALES[shown.colours])
-    mappable = ScalarMappable(_scale(shown), colours.with_extremes(over=OVERUSED) if shown.colours == USED else colours)
+    mappable = ScalarMappable(
+        _scale(shown), colours.with_extremes(over=OVERUSED_COLOUR) if shown.colours == USED else colours
+    )
     flat, near = camera.project(nodes)
     shell = len(truss.triangles) > 0 and not truss.member_sets  # it would hide the second layer
     view = look(nodes, truss.triangles, camera, (0, 0), mapped=False) if shell else None
@@ -161,7 +165,7 @@ def draw_members(figure: Any, place: tuple[float, float, float, float], truss: T
     if shown.moves is not None:
         still, behind = camera.project(truss.nodes)
         lines = _lines(still, truss.members)
-        colour = np.broadcast_to(STILL, (len(lines), 4))
+        colour = np.broadcast_to(UNMOVED_COLOUR, (len(lines), 4))
         parts.append((behind[truss.members].mean(axis=1), lines, np.zeros((len(lines), 4)), colour, 0.4 * width_of))
     order = np.argsort(np.concatenate([part[0] for part in parts]), kind="stable")
     shape, fill, line, widths = (cast(Any, np.concatenate([part[k] for part in parts])[order]) for k in range(1, 5))
@@ -172,19 +176,29 @@ def draw_members(figure: Any, place: tuple[float, float, float, float], truss: T
     mark = float(np.clip(0.2 * camera.zoom * np.median(truss.lengths), 1.5, 4.5))
     held = np.flatnonzero(truss.supports.any(axis=1))
     axes.plot(
-        *flat[held].T, "^", markersize=mark, markerfacecolor="white", markeredgecolor=tuple(INK), markeredgewidth=0.9
+        *flat[held].T,
+        "^",
+        markersize=mark,
+        markerfacecolor="white",
+        markeredgecolor=tuple(INK_COLOUR),
+        markeredgewidth=0.9,
     )
     bar = figure.add_axes((left + width * 0.9, bottom + height * 0.14, width * 0.018, height * 0.72))
     made = figure.colorbar(
         mappable, cax=bar, extend="max" if shown.colours == USED and shown.values.max() > 1 else "neither"
     )
-    made.set_label(shown.label, fontsize=9, color=tuple(INK))
+    made.set_label(shown.label, fontsize=9, color=tuple(INK_COLOUR))
     made.outline.set_linewidth(0.5)
-    bar.tick_params(labelsize=8, colors=tuple(INK), width=0.5)
-    axes.text(margin, 4, "\u25b3 support" if len(held) else "", fontsize=8, color=tuple(INK), va="bottom")
+    bar.tick_params(labelsize=8, colors=tuple(INK_COLOUR), width=0.5)
+    axes.text(margin, 4, "\u25b3 support" if len(held) else "", fontsize=8, color=tuple(INK_COLOUR), va="bottom")
     if shown.factor != 1.0 and shown.moves is not None:
         axes.text(
-            0.15 * size[0], 4, f"displacements drawn {shown.factor:g} times", fontsize=8, color=tuple(INK), va="bottom"
+            0.15 * size[0],
+            4,
+            f"displacements drawn {shown.factor:g} times",
+            fontsize=8,
+            color=tuple(INK_COLOUR),
+            va="bottom",
         )
 
 

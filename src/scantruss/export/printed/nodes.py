@@ -11,9 +11,9 @@ from ...schedules.joints import check_grid, clear_radii, find_joints
 from ..solid import balls_of, bars_of, check_diameters, unite
 from .plates import PrintedPart
 
-WALL = 0.2  # least wall between two sockets over the diameter of the rod
+LEAST_WALL = 0.2  # least wall between two sockets over the diameter of the rod
 LEAST_DEPTH = 0.5  # of a socket over the diameter of the rod
-DEEPEST = 0.7  # of a socket over the radius of the ball
+DEEPEST_SOCKET = 0.7  # of a socket over the radius of the ball
 SOCKET_SIDES = 32  # sides of the prism that stands for a socket
 
 
@@ -40,8 +40,8 @@ def build_nodes(
     wide = member + 2 * clearance
     apart = np.zeros(len(joints.valence))
     at = joints.node[joints.pairs[:, 0]]
-    np.maximum.at(apart, at, clear_radii(joints, np.full(len(grid.edges), wide + WALL * member)))
-    floor = np.maximum(apart, (1.0 - DEEPEST) * node / 2)
+    np.maximum.at(apart, at, clear_radii(joints, np.full(len(grid.edges), wide + LEAST_WALL * member)))
+    floor = np.maximum(apart, (1.0 - DEEPEST_SOCKET) * node / 2)
     needed = 2 * (floor + LEAST_DEPTH * member)
     used = np.flatnonzero(joints.valence)
     names = node_marks(grid)

@@ -22,10 +22,10 @@ from ..solid import balls_of, bars_of, check_diameters, marked_bars, unite
 from .plates import Bed, PrintedPart
 
 PEG_SIDES = 32  # sides of the prism that stands for a peg
-PEG = 0.5  # radius of a peg over that of the coupling; it is as long as the coupling's radius
-FLOOR = 0.4  # what a coupling is longer than its socket, over its radius
-THINNEST = 1.4  # coupling over member
-OVERLAP = 1e-9  # of two parts over one of them, which rounding makes
+PEG_RADIUS = 0.5  # radius of a peg over that of the coupling; it is as long as the coupling's radius
+COUPLING_FLOOR = 0.4  # what a coupling is longer than its socket, over its radius
+THINNEST_COUPLING = 1.4  # coupling over member
+ROUNDED_OVERLAP = 1e-9  # of two parts over one of them, which rounding makes
 MOST_HALVINGS = 40  # of one part
 
 
@@ -39,12 +39,12 @@ class Joint:
     @property
     def peg(self) -> float:
         """Radius of the peg."""
-        return PEG * self.radius
+        return PEG_RADIUS * self.radius
 
     @property
     def half(self) -> float:
         """Length of half a coupling."""
-        return (1.0 + FLOOR) * self.radius + self.clearance
+        return (1.0 + COUPLING_FLOOR) * self.radius + self.clearance
 
     @property
     def wide(self) -> float:
@@ -66,7 +66,7 @@ def check_joint(grid: Grid, member: float, node: float, scale: float, clearance:
     """
     if not 0 < clearance < np.inf:
         raise InputError(f"the clearance must be a positive number, got {clearance}")
-    joint = Joint(max(node, THINNEST * member) / 2, clearance)
+    joint = Joint(max(node, THINNEST_COUPLING * member) / 2, clearance)
     unit = unit_words(grid.unit)
     if clearance > joint.radius / 4:
         raise InputError(
@@ -97,7 +97,7 @@ def _outside_up(axes: np.ndarray, normal: np.ndarray) -> np.ndarray:
     return axes if axes[2] @ normal >= 0 else axes * np.array([[1.0], [-1.0], [-1.0]])
 
 
-def divide(
+def divide_for_bed(
     nodes: np.ndarray, edges: np.ndarray, bed: Bed, pad: float, pad_cut: float, unit: str = ""
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the part of each node (V,), and for each member (E, 3) the direction in which its two parts come apart; 0 within one.
@@ -168,7 +168,7 @@ def build_parts(
     used, edges = np.unique(grid.edges, return_inverse=True)
     edges = edges.reshape(-1, 2)
     nodes = np.asarray(grid.nodes[used], np.float64) * scale
-    part_of, pulled = divide(nodes, edges, bed, node / 2, joint.reach, grid.unit)
+    part_of, pulled = divide_for_bed(nodes, edges, bed, node / 2, joint.reach, grid.unit)
     if (along := (np.diff(nodes[edges], axis=1)[:, 0] * pulled).sum(axis=1)).any():
         edges = np.where((along < 0)[:, None], edges[:, ::-1], edges)  # from the side with pegs to that with sockets
     balls = balls_of(grid, used, nodes, node / 2, sides, marks)
@@ -220,7 +220,7 @@ def check_apart(parts: list[PrintedPart], unit: str = "") -> None:
     for a, b in combinations(range(len(parts)), 2):
         if (boxes[a, :3] > boxes[b, 3:]).any() or (boxes[b, :3] > boxes[a, 3:]).any():
             continue
-        if (shared := (parts[a].body ^ parts[b].body).volume()) > OVERLAP * parts[a].body.volume():
+        if (shared := (parts[a].body ^ parts[b].body).volume()) > ROUNDED_OVERLAP * parts[a].body.volume():
             raise InputError(
                 f"{parts[a].name} and {parts[b].name} would overlap by {shared:.3g}{unit_words(unit, power=3)},"
                 " where plug joints lie close; give smaller diameters or a larger --scale"

@@ -22,7 +22,7 @@ from .nodes import build_nodes
 from .parts import build_parts
 from .plates import Bed, lay_out, together
 
-CLEARANCE = 0.15  # of joints over the diameter of the members, where none is given
+USUAL_CLEARANCE = 0.15  # of joints over the diameter of the members, where none is given
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +89,7 @@ def print_parts(
     check_passed(grid, keep_failed)
     if bed is not None and (len(bed) != 3 or not all(0 < side < math.inf for side in bed)):
         raise InputError(f"the bed must be three positive numbers, width x depth x height, got {bed}")
-    gap = CLEARANCE * member_diameter if clearance is None else clearance
+    gap = USUAL_CLEARANCE * member_diameter if clearance is None else clearance
     contents: dict[Path, bytes] = {}
     if sockets:
         parts, floor = build_nodes(

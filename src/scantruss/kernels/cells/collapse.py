@@ -2,9 +2,64 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ...runtime.jit import kernel
+from .quads import FREE_NODE, RESTING_NODE
+
+
+class NodeLists(NamedTuple):
+    """Where each node stands among some values, in lists without rings."""
+
+    head: np.ndarray  #: (F,) first place of a node, -1: none
+    tail: np.ndarray  #: (F,) last place of it
+    after: np.ndarray  #: (N,) next place of the same node, -1: none
+    places: np.ndarray  #: (F,) how many they are
+
+
+class CollapsingMesh(NamedTuple):
+    """Triangles whose edges are collapsed, and the edges of their boundary and lines."""
+
+    held: np.ndarray  #: (F,) FREE_NODE, SLIDING_NODE or RESTING_NODE
+    triangles: np.ndarray  #: (T, 3), -1 first where one is gone
+    corners: NodeLists  #: of the triangles
+    ends: np.ndarray  #: (2 C,) both ends of each edge of the boundary and lines, side by side; -1 where one is gone
+    links: NodeLists  #: of the ends
+    around_a: np.ndarray  #: (F,) scratch, as the next two: the last collapse that has the node around its first node,
+    around_b: np.ndarray  #: around its second node,
+    on_chain_of: np.ndarray  #: or the node with which it is linked
+    clock: np.ndarray  #: (1,) collapses tried
+
+
+@kernel
+def node_lists(values: np.ndarray, nodes: int) -> NodeLists:
+    """List the places of each node among some values (N,)."""
+    lists = NodeLists(
+        np.full(nodes, -1), np.full(nodes, -1), np.full(len(values), -1), np.zeros(nodes, np.int64)
+    )  # fmt: skip
+    for c in range(len(values)):
+        v = values[c]
+        if lists.head[v] < 0:
+            lists.head[v] = c
+        else:
+            lists.after[lists.tail[v]] = c
+        lists.tail[v] = c
+        lists.places[v] += 1
+    return lists
+
+
+@kernel
+def join_lists(lists: NodeLists, a: int, b: int) -> None:
+    """Give all places of node b to node a."""
+    if lists.head[b] < 0:
+        return
+    if lists.head[a] < 0:
+        lists.head[a] = lists.head[b]
+    else:
+        lists.after[lists.tail[a]] = lists.head[b]
+    lists.tail[a], lists.head[b] = lists.tail[b], -1
 
 
 @kernel
@@ -17,59 +72,121 @@ def found(into: np.ndarray, v: int) -> int:
 
 
 @kernel
-def stamp_around(
-    head: np.ndarray, after: np.ndarray, triangles: np.ndarray, v: int, stamp: np.ndarray, clock: int
-) -> int:
-    """Stamp the neighbours of a node; returns how many they are."""
-    count, c = 0, head[v]
-    while c >= 0:  # ends: the list of corners at a node has no rings
+def has_corner(mesh: CollapsingMesh, t: int, v: int) -> bool:
+    """Whether a node is a corner of a triangle."""
+    return mesh.triangles[t, 0] == v or mesh.triangles[t, 1] == v or mesh.triangles[t, 2] == v
+
+
+@kernel
+def stamp_around(mesh: CollapsingMesh, v: int, stamp: np.ndarray) -> int:
+    """Stamp the neighbours of a node with the clock; returns how many they are."""
+    count, c = 0, mesh.corners.head[v]
+    while c >= 0:  # ends: the list has no rings
         t = c // 3
-        if triangles[t, 0] >= 0:
+        if mesh.triangles[t, 0] >= 0:
             for k in range(3):
-                u = triangles[t, k]
-                if u != v and stamp[u] != clock:
-                    stamp[u] = clock
+                u = mesh.triangles[t, k]
+                if u != v and stamp[u] != mesh.clock[0]:
+                    stamp[u] = mesh.clock[0]
                     count += 1
-        c = after[c]
+        c = mesh.corners.after[c]
     return count
 
 
 @kernel
-def shares_chain(
-    head: np.ndarray, after: np.ndarray, ends: np.ndarray, a: int, b: int, both: np.ndarray
-) -> tuple[bool, int]:
-    """Whether two nodes are neighbours on a chain, and how many others of it are neighbours of both; `both` is scratch (F,)."""
+def shares_chain(mesh: CollapsingMesh, a: int, b: int) -> tuple[bool, int]:
+    """Whether two nodes are neighbours on a chain, and how many others of it are neighbours of both."""
+    ends, links, of = mesh.ends, mesh.links, mesh.on_chain_of
     joined, common = False, 0
-    e = head[a]
-    while e >= 0:  # ends: the list of chain ends at a node has no rings
+    e = links.head[a]
+    while e >= 0:  # ends: the list has no rings
         if ends[e] >= 0:
-            both[ends[e ^ 1]] = a
+            of[ends[e ^ 1]] = a
             joined = joined or ends[e ^ 1] == b
-        e = after[e]
-    e = head[b]
+        e = links.after[e]
+    e = links.head[b]
     while e >= 0:  # ends: likewise
-        if ends[e] >= 0 and both[ends[e ^ 1]] == a:
+        if ends[e] >= 0 and of[ends[e ^ 1]] == a:
             common += 1
-        e = after[e]
-    e = head[a]
+        e = links.after[e]
+    e = links.head[a]
     while e >= 0:  # ends: likewise
         if ends[e] >= 0:
-            both[ends[e ^ 1]] = -1
-        e = after[e]
+            of[ends[e ^ 1]] = -1
+        e = links.after[e]
     return joined, common
 
 
 @kernel
-def fill_lists(values: np.ndarray, head: np.ndarray, tail: np.ndarray, after: np.ndarray, count: np.ndarray) -> None:
-    """Link the places of each node among some values in lists."""
-    for c in range(len(values)):
-        v = values[c]
-        if head[v] < 0:
-            head[v] = c
-        else:
-            after[tail[v]] = c
-        tail[v] = c
-        count[v] += 1
+def sides_of_edge(mesh: CollapsingMesh, a: int, b: int) -> int:
+    """How many triangles an edge has; 0 where one of them is at a corner or two would come to lie on each other."""
+    sides, c, count, links = 0, mesh.corners.head[b], mesh.corners.places, mesh.links.places
+    while c >= 0:  # ends: the list has no rings
+        t = c // 3
+        if mesh.triangles[t, 0] >= 0 and has_corner(mesh, t, a):
+            sides += 1
+            for k in range(3):
+                v = mesh.triangles[t, k]
+                if v != a and v != b and (count[v] <= 1 or (links[v] == 0 and count[v] <= 3)):
+                    return 0
+        c = mesh.corners.after[c]
+    return sides
+
+
+@kernel
+def may_collapse_edge(mesh: CollapsingMesh, a: int, b: int) -> bool:
+    """Whether node b may become node a: the mesh stays a manifold, and a node of a chain goes along it."""
+    if mesh.held[b] == RESTING_NODE:
+        return False
+    sides = sides_of_edge(mesh, a, b)
+    if sides == 0:
+        return False
+    on_chain, common = shares_chain(mesh, a, b)
+    if (mesh.held[b] != FREE_NODE and not on_chain) or (on_chain and common > 0):
+        return False
+    mesh.clock[0] += 1
+    of_a, of_b = stamp_around(mesh, a, mesh.around_a), stamp_around(mesh, b, mesh.around_b)
+    both, c = 0, mesh.corners.head[b]
+    while c >= 0:  # ends: the list has no rings
+        t = c // 3
+        if mesh.triangles[t, 0] >= 0:
+            for k in range(3):
+                v = mesh.triangles[t, k]
+                if mesh.around_a[v] == mesh.clock[0] and mesh.around_b[v] == mesh.clock[0]:
+                    both += 1
+                    mesh.around_b[v] = -1
+        c = mesh.corners.after[c]
+    return both == sides and of_a + of_b - both >= 3 + sides
+
+
+@kernel
+def collapse_edge(mesh: CollapsingMesh, a: int, b: int) -> None:
+    """Let node b become node a, with all of its triangles and links but those at the edge."""
+    triangles, ends, count, links = mesh.triangles, mesh.ends, mesh.corners.places, mesh.links.places
+    c = mesh.corners.head[b]
+    while c >= 0:  # ends: the list has no rings
+        t = c // 3
+        if triangles[t, 0] >= 0:
+            if has_corner(mesh, t, a):
+                for k in range(3):
+                    count[triangles[t, k]] -= 1
+                triangles[t, 0] = -1
+            else:
+                triangles[t, c % 3] = a
+                count[a] += 1
+        c = mesh.corners.after[c]
+    e = mesh.links.head[b]
+    while e >= 0:  # ends: likewise
+        if ends[e] >= 0:
+            if ends[e ^ 1] == a:
+                ends[e] = ends[e ^ 1] = -1
+                links[a] -= 1
+            else:
+                ends[e] = a
+                links[a] += 1
+        e = mesh.links.after[e]
+    join_lists(mesh.corners, a, b)
+    join_lists(mesh.links, a, b)
 
 
 @kernel
@@ -81,20 +198,15 @@ def collapse_edges(
     Parameters
     ----------
     edges : (E, 2) those to collapse, in this order
-    held : (F,) 0 free, 1 slides on a chain, 2 stays
-    triangles : (T, 3) become those that are left, -1 those that are gone
-    ends : (2 C,) both ends of each edge of the boundary and lines, side by side; become those left, -1 those gone
+    held, triangles, ends : as in `CollapsingMesh`; become what is left
     into : (F,) becomes the node that each has become
     """
     nodes = len(held)
-    head, tail, count = np.full(nodes, -1), np.full(nodes, -1), np.zeros(nodes, np.int64)
-    after = np.full(triangles.size, -1)
-    fill_lists(triangles.copy().reshape(triangles.size), head, tail, after, count)
-    first, last, links = np.full(nodes, -1), np.full(nodes, -1), np.zeros(nodes, np.int64)
-    then = np.full(len(ends), -1)
-    fill_lists(ends.copy(), first, last, then, links)
-    around_a, around_b, scratch = np.full(nodes, -1), np.full(nodes, -1), np.full(nodes, -1)
-    waiting, clock = edges.copy(), 0
+    mesh = CollapsingMesh(
+        held, triangles, node_lists(triangles.copy().reshape(triangles.size), nodes), ends, node_lists(ends, nodes),
+        np.full(nodes, -1), np.full(nodes, -1), np.full(nodes, -1), np.zeros(1, np.int64),
+    )  # fmt: skip
+    waiting = edges.copy()
     left, before = len(edges), len(edges) + 1
     while left < before:  # ends: each turn leaves fewer edges, or is the last
         before, left = left, 0
@@ -104,68 +216,9 @@ def collapse_edges(
                 continue
             if held[b] > held[a] or (held[b] == held[a] and b < a):
                 a, b = b, a  # b goes
-            clock += 1
-            refused = held[b] == 2
-            alone, sides, c = True, 0, head[b]
-            while c >= 0 and not refused:  # ends: the list of corners at a node has no rings
-                t = c // 3
-                if triangles[t, 0] >= 0 and (triangles[t, 0] == a or triangles[t, 1] == a or triangles[t, 2] == a):
-                    sides += 1
-                    for k in range(3):
-                        v = triangles[t, k]
-                        if v != a and v != b and (count[v] <= 1 or (links[v] == 0 and count[v] <= 3)):
-                            alone = False  # a triangle at a corner stays; two triangles would lie on each other
-                c = after[c]
-            refused = refused or sides == 0 or not alone
-            if not refused:
-                on_chain, common = shares_chain(first, then, ends, a, b, scratch)
-                refused = (held[b] != 0 and not on_chain) or (on_chain and common > 0)
-            if not refused:
-                of_a = stamp_around(head, after, triangles, a, around_a, clock)
-                of_b = stamp_around(head, after, triangles, b, around_b, clock)
-                both, c = 0, head[b]
-                while c >= 0:  # ends: likewise
-                    t = c // 3
-                    if triangles[t, 0] >= 0:
-                        for k in range(3):
-                            v = triangles[t, k]
-                            if around_a[v] == clock and around_b[v] == clock:
-                                both += 1
-                                around_b[v] = -1
-                    c = after[c]
-                refused = both != sides or of_a + of_b - both < 3 + sides
-            if refused:
+            if may_collapse_edge(mesh, a, b):
+                collapse_edge(mesh, a, b)
+                into[b] = a
+            else:
                 waiting[left, 0], waiting[left, 1] = waiting[i, 0], waiting[i, 1]
                 left += 1
-                continue
-            c = head[b]
-            while c >= 0:  # ends: likewise
-                t = c // 3
-                if triangles[t, 0] >= 0:
-                    if triangles[t, 0] == a or triangles[t, 1] == a or triangles[t, 2] == a:
-                        for k in range(3):
-                            count[triangles[t, k]] -= 1
-                        triangles[t, 0] = -1
-                    else:
-                        triangles[t, c % 3] = a
-                        count[a] += 1
-                c = after[c]
-            after[tail[a]] = head[b]
-            tail[a], head[b] = tail[b], -1
-            e = first[b]
-            while e >= 0:  # ends: the list of chain ends at a node has no rings
-                if ends[e] >= 0:
-                    if ends[e ^ 1] == a:
-                        ends[e] = ends[e ^ 1] = -1
-                        links[a] -= 1
-                    else:
-                        ends[e] = a
-                        links[a] += 1
-                e = then[e]
-            if first[b] >= 0:
-                if first[a] < 0:
-                    first[a] = first[b]
-                else:
-                    then[last[a]] = first[b]
-                last[a], first[b] = last[b], -1
-            into[b] = a

@@ -8,21 +8,43 @@ curve leaves them: `SAG_WEIGHT` times the square of its largest distance over l_
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from ...runtime.jit import kernel
 from ..boundary.curves import Curves, at_arc, is_open, slide
-from ..geometry.vectors import Vector, cross, dot, row, subtract, vector_in
-from ..surface.local_surface import CENTRE, NORMAL, onto_patch
+from ..geometry.vectors import Vector, cross, dot, row, subtract, vector_of
+from ..surface.local_surface import onto_patch
 
-FLAT = 4.0  # what a corner of 180 degrees costs beside the square of its cosine, by the eighth power of that
+STRAIGHT_COST = 4.0  # what a corner of 180 degrees costs beside the square of its cosine, by the eighth power of that
 SAG_WEIGHT = 700.0  # of the square of what a curve is farther from its member than is free
 SAG_FREE = 0.04  # distance of a curve from its member that costs nothing [members]
 SAG_REACH = 2.5  # way along the curve within which its members end [members]
 SAG_SAMPLES = 7  # places on the curve at which it is measured
 SAG_STEP = 0.02  # way along the curve over which its change is found [members]
 QUAD_REACH = 0.8  # distance from the centre of its patch beyond which a node is not moved [member lengths]
+FREE_NODE, SLIDING_NODE, RESTING_NODE = 0, 1, 2  # a node moves on the scan, slides along a curve, or stays
+OFF_CURVE = 0.1  # distance of a corner from a curve within which it is an end of it [members]
+LONGEST_MOVE, SHORTEST_MOVE = 0.3, 1e-4  # of a node at once [members]
+SHORTENED_STEP, STEPS_TRIED = 0.3, 3  # a step that does not gain is made shorter by this, and how often
+
+
+class QuadNet(NamedTuple):
+    """Quads, the quads at each node, and what their nodes move on."""
+
+    nodes: np.ndarray  #: (V, 3) [scan unit]
+    quads: np.ndarray  #: (Q, 4) int64, -1 where one is gone
+    at: np.ndarray  #: (V, D) int64 quads at each node
+    degree: np.ndarray  #: (V,) int64 how many they are
+    held: np.ndarray  #: (V,) int64 FREE_NODE, SLIDING_NODE or RESTING_NODE
+    curve: np.ndarray  #: (V,) int64
+    arc: np.ndarray  #: (V,) [scan unit]
+    patches: np.ndarray  #: (V,) SURFACE_PATCH
+    curves: Curves
+    desired: np.ndarray  #: (V,) member lengths [scan unit]
+    stamp: np.ndarray  #: (V + Q,) int64 scratch
+    clock: np.ndarray  #: (1,) int64
 
 
 @kernel
@@ -40,16 +62,16 @@ def corner_energy(e: Vector, f: Vector, normal: Vector) -> tuple[float, Vector, 
     """Square of the cosine between two ways from a corner, 2 less that where it is turned over; and its gradients by the ways."""
     ee, ff = dot(e, e), dot(f, f)
     if ee <= 0.0 or ff <= 0.0:
-        return 1.0 + FLAT, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+        return 1.0 + STRAIGHT_COST, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     inverse = 1.0 / math.sqrt(ee * ff)
     c = dot(e, f) * inverse
     side = 1.0 if dot(cross(e, f), normal) > 0.0 else -1.0
     c2 = c * c
     c6 = c2 * c2 * c2
-    value = c2 + FLAT * c2 * c6
+    value = c2 + STRAIGHT_COST * c2 * c6
     if side < 0.0:
-        value = 2.0 * (1.0 + FLAT) - value
-    g, ce, cf = side * c * (2.0 + 8.0 * FLAT * c6), c / ee, c / ff
+        value = 2.0 * (1.0 + STRAIGHT_COST) - value
+    g, ce, cf = side * c * (2.0 + 8.0 * STRAIGHT_COST * c6), c / ee, c / ff
     by_e = (g * (f[0] * inverse - ce * e[0]), g * (f[1] * inverse - ce * e[1]), g * (f[2] * inverse - ce * e[2]))
     by_f = (g * (e[0] * inverse - cf * f[0]), g * (e[1] * inverse - cf * f[1]), g * (e[2] * inverse - cf * f[2]))
     return value, by_e, by_f
@@ -57,27 +79,23 @@ def corner_energy(e: Vector, f: Vector, normal: Vector) -> tuple[float, Vector, 
 
 @kernel
 def node_energy(
-    nodes: np.ndarray,
+    net: QuadNet,
     quads: np.ndarray,
     share: np.ndarray,
     of: np.ndarray,
-    begin: int,
-    end: int,
     v: int,
     place: Vector,
-    normal: Vector,
-    desired: np.ndarray,
     lengths: float,
     angles: float,
 ) -> tuple[float, float, float, float]:
     """Energy of the members and corners that move with node v if it stood at a place, and its gradient.
 
     share : (Q, 4) weight of each side of a quad, 1/2 where another quad has it too
-    of : quads at the node are of[begin:end]
+    of : quads at the node
     """
+    nodes, desired, normal = net.nodes, net.desired, vector_of(net.patches[v].normal)
     energy = gx = gy = gz = 0.0
-    for i in range(begin, end):
-        q = of[i]
+    for q in of:
         k = 0
         for corner in range(4):
             if quads[q, corner] == v:
@@ -101,21 +119,18 @@ def node_energy(
 
 
 @kernel
-def way_on_curve(
-    nodes: np.ndarray, held: np.ndarray, curve: np.ndarray, arc: np.ndarray, curves: Curves, on: int, from_arc: float,
-    u: int, target: float,
-) -> float:  # fmt: skip
+def way_on_curve(net: QuadNet, on: int, from_arc: float, u: int, target: float) -> float:
     """Way along a curve from an arc length to another node; 0 where that is not near it on the same curve."""
-    there, total, reach = arc[u], curves.total[on], SAG_REACH * target
-    if held[u] == 1 and curve[u] != on:
+    there, total, reach = net.arc[u], net.curves.total[on], SAG_REACH * target
+    if net.held[u] == SLIDING_NODE and net.curve[u] != on:
         return 0.0
-    if held[u] != 1:  # a corner or an end, which is on several curves
-        there, x, y, z = slide(curves, on, from_arc, reach, nodes[u, 0], nodes[u, 1], nodes[u, 2])
-        off = subtract((x, y, z), row(nodes, u))
-        if dot(off, off) > 0.01 * target * target:
+    if net.held[u] != SLIDING_NODE:  # a corner or an end, which is on several curves
+        there, x, y, z = slide(net.curves, on, from_arc, reach, net.nodes[u, 0], net.nodes[u, 1], net.nodes[u, 2])
+        off = subtract((x, y, z), row(net.nodes, u))
+        if dot(off, off) > OFF_CURVE * OFF_CURVE * target * target:
             return 0.0
     way = there - from_arc
-    if not is_open(curves, on):
+    if not is_open(net.curves, on):
         way -= total * math.floor(way / total + 0.5)
     return way if abs(way) < reach else 0.0
 
@@ -143,47 +158,110 @@ def sag_energy(sag: float) -> float:
 
 @kernel
 def sag_around(
-    nodes: np.ndarray, quads: np.ndarray, share: np.ndarray, of: np.ndarray, begin: int, end: int, v: int, place: Vector,
-    here: float, held: np.ndarray, curve: np.ndarray, arc: np.ndarray, curves: Curves, desired: np.ndarray,
-) -> tuple[float, float]:  # fmt: skip
+    net: QuadNet, quads: np.ndarray, share: np.ndarray, of: np.ndarray, v: int, place: Vector, here: float
+) -> tuple[float, float]:
     """What the members at a node cost because its curve leaves them, if it stood at a place, `here` on its curve.
 
     Also how far the node may slide before one costs more, as the curve cannot leave it by more than that [members]. Other
     parameters as in `node_energy`.
     """
     energy, most = 0.0, 0.0
-    for i in range(begin, end):
-        q = of[i]
+    for q in of:
         k = 0
         for corner in range(4):
             if quads[q, corner] == v:
                 k = corner
         for way in (1, 3):
             u = quads[q, (k + way) % 4]
-            if held[u] > 0:
+            if net.held[u] != FREE_NODE:
                 weight = share[q, k] if way == 1 else share[q, (k + 3) % 4]
-                target = 0.5 * (desired[v] + desired[u])
-                along_it = way_on_curve(nodes, held, curve, arc, curves, curve[v], here, u, target)
+                target = 0.5 * (net.desired[v] + net.desired[u])
+                along_it = way_on_curve(net, net.curve[v], here, u, target)
                 if along_it != 0.0:
-                    sag = sag_of(curves, curve[v], here, along_it, place, row(nodes, u), target)
+                    sag = sag_of(net.curves, net.curve[v], here, along_it, place, row(net.nodes, u), target)
                     energy, most = energy + weight * sag_energy(sag), max(most, sag)
     return energy, SAG_FREE - most
 
 
 @kernel
+def sag_slope(net: QuadNet, quads: np.ndarray, share: np.ndarray, of: np.ndarray, v: int) -> Vector:
+    """Gradient of `sag_around` where a node slides along its curve."""
+    by = SAG_STEP * net.desired[v]
+    back, x, y, z = at_arc(net.curves, net.curve[v], net.arc[v] - by)
+    there, u, w, t = at_arc(net.curves, net.curve[v], net.arc[v] + by)
+    slope = (
+        sag_around(net, quads, share, of, v, (u, w, t), there)[0]
+        - sag_around(net, quads, share, of, v, (x, y, z), back)[0]
+    )
+    run = subtract((u, w, t), (x, y, z))
+    slope /= max(dot(run, run), by * by)
+    return slope * run[0], slope * run[1], slope * run[2]
+
+
+@kernel
+def settle_quad_node(
+    net: QuadNet,
+    quads: np.ndarray,
+    share: np.ndarray,
+    of: np.ndarray,
+    v: int,
+    lengths: float,
+    angles: float,
+    stride: float,
+) -> float:
+    """Move a node downhill, on the scan or along its curve; returns by how much its energy fell."""
+    place = row(net.nodes, v)
+    before, gx, gy, gz = node_energy(net, quads, share, of, v, place, lengths, angles)
+    spare, slides = 0.0, net.held[v] == SLIDING_NODE
+    if slides:
+        sagging, spare = sag_around(net, quads, share, of, v, place, net.arc[v])
+        before += sagging
+        if spare < SAG_STEP:
+            x, y, z = sag_slope(net, quads, share, of, v)
+            gx, gy, gz = gx + x, gy + y, gz + z
+    else:
+        normal = vector_of(net.patches[v].normal)
+        over = gx * normal[0] + gy * normal[1] + gz * normal[2]
+        gx, gy, gz = gx - over * normal[0], gy - over * normal[1], gz - over * normal[2]
+    local = net.desired[v]
+    step = stride * local * local / (len(of) * (2.0 * lengths * 0.5 + 4.0 * angles))
+    size = step * math.sqrt(gx * gx + gy * gy + gz * gz)
+    if size < SHORTEST_MOVE * local:
+        return 0.0
+    most = LONGEST_MOVE * local
+    if size > most:
+        step *= most / size
+    for _ in range(STEPS_TRIED):
+        to = (place[0] - step * gx, place[1] - step * gy, place[2] - step * gz)
+        new = net.arc[v]
+        if slides:
+            new, x, y, z = slide(net.curves, net.curve[v], net.arc[v], most, to[0], to[1], to[2])
+            to = (x, y, z)
+        else:
+            to = onto_patch(net.patches[v], to)
+            d = subtract(to, vector_of(net.patches[v].centre))
+            if dot(d, d) > QUAD_REACH * QUAD_REACH * local * local:
+                step *= SHORTENED_STEP
+                continue
+        after = node_energy(net, quads, share, of, v, to, lengths, angles)[0]
+        if slides and size > spare * local:
+            after += sag_around(net, quads, share, of, v, to, new)[0]
+        if after < before:
+            net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2] = to
+            net.arc[v] = new
+            return before - after
+        step *= SHORTENED_STEP
+    return 0.0
+
+
+@kernel
 def settle_quads(
-    nodes: np.ndarray,
+    net: QuadNet,
     quads: np.ndarray,
     share: np.ndarray,
     of: np.ndarray,
     start: np.ndarray,
     some: np.ndarray,
-    held: np.ndarray,
-    curve: np.ndarray,
-    arc: np.ndarray,
-    patches: np.ndarray,
-    curves: Curves,
-    desired: np.ndarray,
     lengths: float,
     angles: float,
     sweeps: int,
@@ -197,69 +275,9 @@ def settle_quads(
     for sweep in range(sweeps):
         gain = 0.0
         for k in range(len(some)):
-            v = some[k]
-            if held[v] == 2:
-                continue
-            place, normal = row(nodes, v), vector_in(patches, v, NORMAL)
-            begin, end = start[k], start[k + 1]
-            before, gx, gy, gz = node_energy(
-                nodes, quads, share, of, begin, end, v, place, normal, desired, lengths, angles
-            )
-            spare = 0.0
-            if held[v] == 1:
-                sagging, spare = sag_around(
-                    nodes, quads, share, of, begin, end, v, place, arc[v], held, curve, arc, curves, desired
-                )
-                before += sagging
-                if spare < SAG_STEP:
-                    by = SAG_STEP * desired[v]
-                    back, x, y, z = at_arc(curves, curve[v], arc[v] - by)
-                    there, u, w, t = at_arc(curves, curve[v], arc[v] + by)
-                    slope = (
-                        sag_around(
-                            nodes, quads, share, of, begin, end, v, (u, w, t), there, held, curve, arc, curves, desired
-                        )[0]
-                        - sag_around(
-                            nodes, quads, share, of, begin, end, v, (x, y, z), back, held, curve, arc, curves, desired
-                        )[0]
-                    )
-                    run = subtract((u, w, t), (x, y, z))
-                    slope /= max(dot(run, run), by * by)
-                    gx, gy, gz = gx + slope * run[0], gy + slope * run[1], gz + slope * run[2]
-            else:
-                over = gx * normal[0] + gy * normal[1] + gz * normal[2]
-                gx, gy, gz = gx - over * normal[0], gy - over * normal[1], gz - over * normal[2]
-            local = desired[v]
-            step = stride * local * local / ((end - begin) * (2.0 * lengths * 0.5 + 4.0 * angles))
-            size = step * math.sqrt(gx * gx + gy * gy + gz * gz)
-            if size < 1e-4 * local:
-                continue
-            most = 0.3 * local
-            if size > most:
-                step *= most / size
-            for _ in range(3):
-                to = (place[0] - step * gx, place[1] - step * gy, place[2] - step * gz)
-                new = arc[v]
-                if held[v] == 1:
-                    new, x, y, z = slide(curves, curve[v], arc[v], most, to[0], to[1], to[2])
-                    to = (x, y, z)
-                else:
-                    to = onto_patch(patches[v], to)
-                    d = subtract(to, vector_in(patches, v, CENTRE))
-                    if dot(d, d) > QUAD_REACH * QUAD_REACH * local * local:
-                        step *= 0.3
-                        continue
-                after = node_energy(nodes, quads, share, of, begin, end, v, to, normal, desired, lengths, angles)[0]
-                if held[v] == 1 and size > spare * local:
-                    after += sag_around(
-                        nodes, quads, share, of, begin, end, v, to, new, held, curve, arc, curves, desired
-                    )[0]
-                if after < before:
-                    nodes[v, 0], nodes[v, 1], nodes[v, 2] = to
-                    arc[v] = new
-                    gain += before - after
-                    break
-                step *= 0.3
+            if net.held[some[k]] != RESTING_NODE:
+                own = of[start[k] : start[k + 1]]
+                gain += settle_quad_node(net, quads, share, own, some[k], lengths, angles, stride)
         if gain < enough * len(some):
             return sweep + 1
     return sweeps
@@ -267,37 +285,25 @@ def settle_quads(
 
 @kernel
 def energy_of_quads(
-    nodes: np.ndarray,
-    quads: np.ndarray,
-    share: np.ndarray,
-    held: np.ndarray,
-    curve: np.ndarray,
-    arc: np.ndarray,
-    patches: np.ndarray,
-    curves: Curves,
-    desired: np.ndarray,
-    lengths: float,
-    angles: float,
-    out: np.ndarray,
+    net: QuadNet, quads: np.ndarray, share: np.ndarray, lengths: float, angles: float, out: np.ndarray
 ) -> float:
     """Fill in the energy of each quad (Q,), with its share of its sides; returns their sum."""
-    total = 0.0
+    nodes, held, total = net.nodes, net.held, 0.0
     for q in range(len(quads)):
         energy = 0.0
         for k in range(4):
             v, a, b = quads[q, k], quads[q, (k + 1) % 4], quads[q, (k + 3) % 4]
-            place = row(nodes, v)
-            s = side_energy(place, row(nodes, a), 0.5 * (desired[v] + desired[a]))[0]
+            place, target = row(nodes, v), 0.5 * (net.desired[v] + net.desired[a])
+            s = side_energy(place, row(nodes, a), target)[0]
             energy += lengths * share[q, k] * s
-            if held[v] > 0 and held[a] > 0 and held[v] + held[a] < 4:
-                on, other = (v, a) if held[v] == 1 else (a, v)
-                target = 0.5 * (desired[v] + desired[a])
-                way = way_on_curve(nodes, held, curve, arc, curves, curve[on], arc[on], other, target)
+            if held[v] != FREE_NODE and held[a] != FREE_NODE and (held[v] == SLIDING_NODE or held[a] == SLIDING_NODE):
+                on, other = (v, a) if held[v] == SLIDING_NODE else (a, v)
+                way = way_on_curve(net, net.curve[on], net.arc[on], other, target)
                 if way != 0.0:
-                    sag = sag_of(curves, curve[on], arc[on], way, row(nodes, on), row(nodes, other), target)
+                    sag = sag_of(net.curves, net.curve[on], net.arc[on], way, row(nodes, on), row(nodes, other), target)
                     energy += share[q, k] * sag_energy(sag)
             e, f = subtract(row(nodes, a), place), subtract(row(nodes, b), place)
-            energy += angles * corner_energy(e, f, vector_in(patches, v, NORMAL))[0]
+            energy += angles * corner_energy(e, f, vector_of(net.patches[v].normal))[0]
         out[q] = energy
         total += energy
     return total

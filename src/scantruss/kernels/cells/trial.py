@@ -2,33 +2,14 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from ...runtime.jit import kernel
-from ..boundary.curves import Curves
-from .quads import energy_of_quads, settle_quads
+from .quads import FREE_NODE, QuadNet, energy_of_quads, settle_quads
 
 TRIAL_SWEEPS = 8  # most sweeps of a trial
-HOPELESS = ((1, 1.6), (2, 0.6), (4, 0.15))  # sweeps, and the energy over what is allowed that more of them never gained
-
-
-class QuadNet(NamedTuple):
-    """Quads, the quads at each node, and what their nodes move on."""
-
-    nodes: np.ndarray  #: (V, 3) [scan unit]
-    quads: np.ndarray  #: (Q, 4) int64, -1 where one is gone
-    at: np.ndarray  #: (V, D) int64 quads at each node
-    degree: np.ndarray  #: (V,) int64 how many they are
-    held: np.ndarray  #: (V,) int64 0 free, 1 slides on a curve, 2 stays
-    curve: np.ndarray  #: (V,) int64
-    arc: np.ndarray  #: (V,) [scan unit]
-    patches: np.ndarray  #: (V, PATCH_COLUMNS)
-    curves: Curves
-    desired: np.ndarray  #: (V,) member lengths [scan unit]
-    stamp: np.ndarray  #: (V + Q,) int64 scratch
-    clock: np.ndarray  #: (1,) int64
+# sweeps, and the energy over what is allowed that more of them never gained
+HOPELESS_AFTER = ((1, 1.6), (2, 0.6), (4, 0.15))
 
 
 @kernel
@@ -85,35 +66,9 @@ def quads_around(net: QuadNet, touched: np.ndarray, found: np.ndarray) -> int:
 
 
 @kernel
-def settle_inside(
-    net: QuadNet, quads: np.ndarray, share: np.ndarray, of: np.ndarray, start: np.ndarray, some: np.ndarray,
-    lengths: float, angles: float, sweeps: int, stride: float, enough: float,
-) -> int:  # fmt: skip
-    """Settle some nodes of a net; see `settle_quads`."""
-    return settle_quads(
-        net.nodes, quads, share, of, start, some, net.held, net.curve, net.arc, net.patches, net.curves, net.desired,
-        lengths, angles, sweeps, stride, enough,
-    )  # fmt: skip
-
-
-@kernel
-def energy_inside(net: QuadNet, quads: np.ndarray, share: np.ndarray, lengths: float, angles: float) -> float:
+def energy_of(net: QuadNet, quads: np.ndarray, share: np.ndarray, lengths: float, angles: float) -> float:
     """Energy of some quads of a net."""
-    out = np.empty(len(quads))
-    return energy_of_quads(
-        net.nodes,
-        quads,
-        share,
-        net.held,
-        net.curve,
-        net.arc,
-        net.patches,
-        net.curves,
-        net.desired,
-        lengths,
-        angles,
-        out,
-    )
+    return energy_of_quads(net, quads, share, lengths, angles, np.empty(len(quads)))
 
 
 @kernel
@@ -186,8 +141,8 @@ def try_quads(
         old[i, 0], old[i, 1], old[i, 2], old[i, 3] = net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2], net.arc[v]
     share = np.empty((count, 4))
     shares_of(before, at_boundary, share)
-    energy = energy_inside(net, before, share, lengths, angles)
-    if join >= 0 and net.held[join] == 0:
+    energy = energy_of(net, before, share, lengths, angles)
+    if join >= 0 and net.held[join] == FREE_NODE:
         for k in range(3):
             net.nodes[join, k] = 0.5 * (net.nodes[join, k] + net.nodes[joined, k])
     share = np.empty((row, 4))
@@ -195,16 +150,16 @@ def try_quads(
     some, start, of = np.empty(4 * row, np.int64), np.zeros(4 * row + 1, np.int64), np.empty(4 * row, np.int64)
     number = inner_nodes(net, before, after, some, start, of)
     growth, made = np.inf, 0
-    for sweeps, too_much in HOPELESS:
-        settle_inside(
+    for sweeps, too_much in HOPELESS_AFTER:
+        settle_quads(
             net, after, share, of, start[: number + 1], some[:number], lengths, angles, sweeps - made, stride, enough
         )
         made = sweeps
-        growth = energy_inside(net, after, share, lengths, angles) - energy
+        growth = energy_of(net, after, share, lengths, angles) - energy
         if growth > allowed + too_much:
             break
-    if growth <= allowed + HOPELESS[-1][1]:
-        settle_inside(
+    if growth <= allowed + HOPELESS_AFTER[-1][1]:
+        settle_quads(
             net,
             after,
             share,
@@ -217,7 +172,7 @@ def try_quads(
             stride,
             enough,
         )
-        growth = energy_inside(net, after, share, lengths, angles) - energy
+        growth = energy_of(net, after, share, lengths, angles) - energy
     if growth >= allowed:
         for i in range(around):
             v = places[i]

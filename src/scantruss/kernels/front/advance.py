@@ -10,8 +10,7 @@ from ...runtime.jit import kernel
 from ..geometry.triangles import quality, turned
 from ..geometry.vectors import Vector, along, cross, dot, norm, row, subtract, unit
 from ..surface.local_surface import (
-    NEAREST_SAMPLE,
-    PATCH_COLUMNS,
+    SURFACE_PATCH,
     Surface,
     fit_patch,
     flood,
@@ -25,15 +24,9 @@ from .fits import fits, left_angle, near_nodes, right_angle
 from .front import (
     ACTIVE,
     DONE,
-    FIRST,
     FULL,
-    LAST,
-    LOOK_AT_EDGES,
     MORE,
     MOST_NEAR_NODES,
-    NODES,
-    SEGMENTS,
-    TRIANGLES,
     WAITING,
     Front,
     Rules,
@@ -46,7 +39,8 @@ from .front import (
 ALONG_LIMB = 0.3  # cosine between a triangle and the normal at a node below which it may shut off a limb
 # distance of the middle of a triangle from the nearest sample at which it has left the sheet [member lengths]
 TRIANGLE_OFF_SHEET = 0.36
-SIGHT, TIP = 0.9, 0.55  # how far such a triangle looks for more scan, and what may lie beyond it [member lengths]
+# how far such a triangle looks for more scan, and what may lie beyond it [member lengths]
+SIGHT_BEYOND_TRIANGLE, LARGEST_TIP_BEYOND = 0.9, 0.55
 STEPS_AROUND = 4  # in which the surface is followed around a bend
 NO_BEND = 0.8  # cosine between the normals before and behind a bend above which it is none
 GOOD_ENOUGH = 0.8  # quality with an existing node, as a share of the best possible, above which no new node is tried
@@ -115,13 +109,13 @@ def beside_line(surface: Surface, front: Front, s: int, place: Vector, length: f
 
 
 @kernel
-def propose_on_surface(surface: Surface, front: Front, s: int, place: Vector, patch: np.ndarray) -> bool:
+def propose_on_surface(surface: Surface, front: Front, s: int, place: Vector, patch: np.record) -> bool:
     """Propose a node at the projection of a place onto the surface; False if the scan has no points there."""
     sample = front.sample[front.tail[s]]
     if fit_patch(surface, patch, sample, place) < 3:
         return False
     foot = onto_patch(patch, place)
-    near = walk(surface, int(patch[NEAREST_SAMPLE]), foot)
+    near = walk(surface, patch.sample, foot)
     gap = norm(subtract(row(surface.mean, near), foot))
     normal = patch_normal(patch, foot)
     propose_node(front, foot, normal, near, False)
@@ -131,9 +125,9 @@ def propose_on_surface(surface: Surface, front: Front, s: int, place: Vector, pa
 @kernel
 def goes_on(surface: Surface, sample: int, middle: Vector, ahead: Vector, length: float) -> bool:
     """Whether the sheet of a sample goes on beyond a place in a direction, as a limb does beyond a triangle across it."""
-    far = along(middle, SIGHT * length, ahead)
+    far = along(middle, SIGHT_BEYOND_TRIANGLE * length, ahead)
     sample = walk(surface, sample, far)
-    return dot(subtract(row(surface.mean, sample), middle), ahead) > TIP * length
+    return dot(subtract(row(surface.mean, sample), middle), ahead) > LARGEST_TIP_BEYOND * length
 
 
 @kernel
@@ -159,7 +153,7 @@ def shuts_off(surface: Surface, front: Front, s: int, p: int, length: float, str
 
 
 @kernel
-def propose_around_bend(surface: Surface, front: Front, s: int, side: float, patch: np.ndarray) -> bool:
+def propose_around_bend(surface: Surface, front: Front, s: int, side: float, patch: np.record) -> bool:
     """Propose a node at the height of a regular triangle over a segment, measured along the surface, where that bends sharply.
 
     In the plane of the segment the same way leads across a limb to its other side. False where the surface hardly bends.
@@ -175,7 +169,7 @@ def propose_around_bend(surface: Surface, front: Front, s: int, side: float, pat
         if fit_patch(surface, patch, sample, place) < 3:
             return False
         place = onto_patch(patch, place)
-        normal, sample = patch_normal(patch, place), walk(surface, int(patch[NEAREST_SAMPLE]), place)
+        normal, sample = patch_normal(patch, place), walk(surface, patch.sample, place)
         ahead = unit(along(ahead, -dot(ahead, normal), normal))
     if dot(normal, first) > NO_BEND:
         return False
@@ -187,7 +181,7 @@ def propose_around_bend(surface: Surface, front: Front, s: int, side: float, pat
 
 @kernel
 def choose_by_quality(
-    surface: Surface, front: Front, s: int, rules: Rules, found: np.ndarray, patch: np.ndarray
+    surface: Surface, front: Front, s: int, rules: Rules, found: np.ndarray, patch: np.record
 ) -> bool:
     """Attach the best triangle that fits: with a neighbour's end, a node of the front nearby or a new node; False if none fits."""
     length, strict = rules.length, rules.strict
@@ -201,7 +195,7 @@ def choose_by_quality(
     segment = norm(subtract(pb, pa))
     side = rules.length_weight * length + (1.0 - rules.length_weight) * segment  # mixed as in Eq. 10
     place = ideal_point(front, s, alpha, beta, side)
-    if front.count[LOOK_AT_EDGES] == 1 and front.on_boundary[a] and front.on_boundary[b]:
+    if front.sharp_edges and front.on_boundary[a] and front.on_boundary[b]:
         place = beside_line(surface, front, s, place, length)
     widest = WIDEST_CLOSED + WIDER_CLOSED * (1.0 - strict)
     around = (AROUND_IDEAL + FARTHER_AROUND_IDEAL * (1.0 - strict)) * length
@@ -231,19 +225,19 @@ def choose_by_quality(
         if not proposed and (best < 0 or score[best] < enough):
             proposed = True
             if propose_on_surface(surface, front, s, place, patch):
-                pp = row(front.nodes, front.count[NODES])
-                if far_from_front(front, s, front.count[NODES], pp, found, near, room, length):
+                pp = row(front.nodes, front.counts.nodes)
+                if far_from_front(front, s, front.counts.nodes, pp, found, near, room, length):
                     score[near] = quality(pa, pb, pp, side, rules.shape_weight, rules.size_weight)
             continue
         if best < 0 or score[best] < LEAST_QUALITY * strict:
             if around_bend or not propose_around_bend(surface, front, s, side, patch):
                 return False
             around_bend = True
-            pp = row(front.nodes, front.count[NODES])
-            if far_from_front(front, s, front.count[NODES], pp, found, near, room, length):
+            pp = row(front.nodes, front.counts.nodes)
+            if far_from_front(front, s, front.counts.nodes, pp, found, near, room, length):
                 score[near] = quality(pa, pb, pp, side, rules.shape_weight, rules.size_weight)
             continue
-        p = found[best] if best < near else front.count[NODES]
+        p = found[best] if best < near else front.counts.nodes
         good, passage = fits(front, s, p, found, near, length, strict)
         if good and not shuts_off(surface, front, s, p, length, strict):
             if best == near:
@@ -257,19 +251,19 @@ def choose_by_quality(
 def has_room(front: Front) -> bool:
     """Whether the arrays hold what advancing one segment may add."""
     return (
-        front.count[NODES] + 2 <= len(front.nodes)
-        and front.count[SEGMENTS] + 4 <= len(front.tail)
-        and front.count[TRIANGLES] + 3 <= len(front.triangles)
-        and front.count[LAST] - front.count[FIRST] + 4 <= len(front.queue)
+        front.counts.nodes + 2 <= len(front.nodes)
+        and front.counts.segments + 4 <= len(front.tail)
+        and front.counts.triangles + 3 <= len(front.triangles)
+        and front.counts.last - front.counts.first + 4 <= len(front.queue)
     )
 
 
 @kernel
 def take_segment(front: Front) -> int:
     """Next active segment of the queue, -1 if it is empty."""
-    while front.count[FIRST] < front.count[LAST]:  # each turn takes one out
-        s = front.queue[front.count[FIRST] % len(front.queue)]
-        front.count[FIRST] += 1
+    while front.counts.first < front.counts.last:  # each turn takes one out
+        s = front.queue[front.counts.first % len(front.queue)]
+        front.counts.first += 1
         if front.state[s] == ACTIVE:
             return s
     return -1
@@ -292,7 +286,7 @@ def rules_of_segment(surface: Surface, front: Front, s: int, rules: Rules) -> Ru
 def advance(surface: Surface, front: Front, rules: Rules, budget: int) -> int:
     """Advance segments by quality until none is left (DONE), the budget is spent (MORE) or an array is full (FULL)."""
     found = np.empty(MOST_NEAR_NODES, np.int64)
-    patch = np.zeros(PATCH_COLUMNS)
+    patch = np.zeros(1, SURFACE_PATCH)
     for _ in range(budget):
         if not has_room(front):
             return FULL
@@ -300,7 +294,7 @@ def advance(surface: Surface, front: Front, rules: Rules, budget: int) -> int:
         if s < 0:
             return DONE
         own = rules_of_segment(surface, front, s, rules)
-        if not choose_by_quality(surface, front, s, own, found, patch):
+        if not choose_by_quality(surface, front, s, own, found, patch[0]):
             front.state[s] = WAITING
     return MORE
 
@@ -309,7 +303,7 @@ def advance(surface: Surface, front: Front, rules: Rules, budget: int) -> int:
 def advance_by_cases(surface: Surface, front: Front, rules: Rules, budget: int) -> int:
     """Advance segments by the six cases of Table 1, as `advance` does by quality; apart, so that it is compiled for method paper only."""
     found = np.empty(MOST_NEAR_NODES, np.int64)
-    patch = np.zeros(PATCH_COLUMNS)
+    patch = np.zeros(1, SURFACE_PATCH)
     for _ in range(budget):
         if not has_room(front):
             return FULL
@@ -317,6 +311,6 @@ def advance_by_cases(surface: Surface, front: Front, rules: Rules, budget: int) 
         if s < 0:
             return DONE
         own = rules_of_segment(surface, front, s, rules)
-        if not choose_by_case(surface, front, s, own, found, patch):
+        if not choose_by_case(surface, front, s, own, found, patch[0]):
             front.state[s] = WAITING
     return MORE

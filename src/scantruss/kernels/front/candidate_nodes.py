@@ -11,8 +11,11 @@ from ..geometry.boxes import search
 from ..geometry.triangles import distance_to_segment
 from ..geometry.vectors import dot, norm, row, subtract
 from ..mesh.point_location import nearest_sample
-from ..surface.local_surface import NEAREST_SAMPLE, PATCH_COLUMNS, Surface, fit_patch, patch_normal, walk
-from .front import MOST_NEAR_NODES, NODES, Front, add_node, propose_node
+from ..surface.local_surface import SURFACE_PATCH, Surface, fit_patch, patch_normal, walk
+from .front import MOST_NEAR_NODES, Front, add_node, propose_node
+
+# distance of a node from its sample above which the nearest is looked for [steps between samples]
+FAR_FROM_SAMPLE = 2.0
 
 
 class CandidateNodes(NamedTuple):
@@ -27,16 +30,16 @@ class CandidateNodes(NamedTuple):
 @kernel
 def add_still_nodes(front: Front, surface: Surface, nodes: np.ndarray) -> int:
     """Add nodes (K, 3) of the boundary or of lines, each near the one before; returns the number of the first."""
-    patch = np.zeros(PATCH_COLUMNS)
-    first, sample = front.count[NODES], -1
+    patch = np.zeros(1, SURFACE_PATCH)
+    first, sample = front.counts.nodes, -1
     for i in range(len(nodes)):
         place = row(nodes, i)
         if sample >= 0:
             sample = walk(surface, sample, place)
-        if sample < 0 or norm(subtract(row(surface.mean, sample), place)) > 2.0 * surface.step:
+        if sample < 0 or norm(subtract(row(surface.mean, sample), place)) > FAR_FROM_SAMPLE * surface.step:
             sample = nearest_sample(surface, place[0], place[1], place[2])
-        fit_patch(surface, patch, sample, place)
-        propose_node(front, place, patch_normal(patch, place), int(patch[NEAREST_SAMPLE]), True)
+        fit_patch(surface, patch[0], sample, place)
+        propose_node(front, place, patch_normal(patch[0], place), patch[0].sample, True)
         add_node(front)
     return first
 
@@ -45,7 +48,7 @@ def add_still_nodes(front: Front, surface: Surface, nodes: np.ndarray) -> int:
 def add_candidate_nodes(front: Front, surface: Surface, candidates: CandidateNodes, clear: float) -> None:
     """Add the candidate nodes that are farther than `clear` from the front segments on their sheet."""
     found = np.empty(MOST_NEAR_NODES, np.int64)
-    begun = front.count[NODES]
+    begun = front.counts.nodes
     for i in range(len(candidates.places)):
         place, normal = row(candidates.places, i), row(candidates.normals, i)
         near = search(front.boxes, front.nodes, place[0], place[1], place[2], 2.0 * clear + candidates.length, found)

@@ -14,7 +14,6 @@ from ..surface.local_surface import Surface, fit_patch, flood, onto_patch, patch
 from .fits import clear_of_front, faces_away, fits, left_angle, near_nodes, right_angle
 from .front import (
     INACTIVE,
-    NODES,
     Front,
     Rules,
     add_node,
@@ -43,7 +42,8 @@ STEPS_AROUND_MERGED = 2.0
 MARGIN_OF_SEARCH = 1.5  # how much farther than the search range the samples reach whose points are looked at
 WIDENED_SEARCH = 2.0  # by which a search range without points grows, once
 
-TRIANGLE, QUAD, BOTH, NEITHER, RIGHT, LEFT = 1, 2, 3, 4, 5, 6  # rules of the cases in Table 1
+# numbers of the cases in Table 1: closed triangle, closed quadrangle, both angles small, none, only beta, only alpha
+CASE_1, CASE_2, CASE_3, CASE_4, CASE_5, CASE_6 = 1, 2, 3, 4, 5, 6
 
 
 @kernel
@@ -52,14 +52,14 @@ def case_of(front: Front, s: int, alpha: float, beta: float, limit: float) -> in
     before, after = front.previous[s], front.next[s]
     at_end = front.tail[before] == front.head[s] or front.head[after] == front.tail[s]  # of a line
     if front.next[after] == before and not at_end:
-        return TRIANGLE
+        return CASE_1
     if front.next[front.next[after]] == before and not at_end:
-        return QUAD
+        return CASE_2
     if alpha < limit and beta < limit:
-        return BOTH
+        return CASE_3
     if alpha < limit:
-        return LEFT
-    return RIGHT if beta < limit else NEITHER
+        return CASE_6
+    return CASE_5 if beta < limit else CASE_4
 
 
 @kernel
@@ -253,7 +253,7 @@ def divide_quadrangle(front: Front, s: int, rules: Rules, found: np.ndarray, nea
 
 
 @kernel
-def optimal_point(surface: Surface, front: Front, s: int, rules: Rules, patch: np.ndarray) -> bool:
+def optimal_point(surface: Surface, front: Front, s: int, rules: Rules, patch: np.record) -> bool:
     """Step 1 of Sec. 3.4: propose the point of the cloud that makes the best triangle with a segment; False if there is none.
 
     The search covers the points no farther than b from the plane that halves the segment, at r - h to r + h from the segment, on its
@@ -358,12 +358,12 @@ def best_existing_node(front: Front, s: int, rules: Rules, found: np.ndarray, ne
 
 @kernel
 def new_node(
-    surface: Surface, front: Front, s: int, rules: Rules, found: np.ndarray, near: int, patch: np.ndarray
+    surface: Surface, front: Front, s: int, rules: Rules, found: np.ndarray, near: int, patch: np.record
 ) -> bool:
     """Table 1, case 4: the three steps of Sec. 3.4."""
     if not optimal_point(surface, front, s, rules, patch):
         return False
-    p = front.count[NODES]
+    p = front.counts.nodes
     pp = row(front.nodes, p)
     if far_from_front(front, s, p, pp, found, near, rules.nearness * rules.length, rules.length):
         good, passage = fits(front, s, p, found, near, rules.length, CASE_STRICTNESS)
@@ -377,22 +377,22 @@ def new_node(
 
 
 @kernel
-def choose_by_case(surface: Surface, front: Front, s: int, rules: Rules, found: np.ndarray, patch: np.ndarray) -> bool:
+def choose_by_case(surface: Surface, front: Front, s: int, rules: Rules, found: np.ndarray, patch: np.record) -> bool:
     """Advance a segment by the six cases of Table 1; False if the case's triangle does not fit."""
     near = near_nodes(surface, front, s, SEARCH_REACH * rules.length, rules.length, found)
     case = case_of(front, s, left_angle(front, s), right_angle(front, s), rules.merge_angle)
-    if case == TRIANGLE:
+    if case == CASE_1:
         return close_triangle(front, s, rules, found, near)
-    if case == QUAD:
+    if case == CASE_2:
         return close_quadrangle(front, s, rules, found, near)
-    if case == BOTH:
+    if case == CASE_3:
         if rules.quadrangle:
             return divide_quadrangle(front, s, rules, found, near)
         if merge_neighbors(surface, front, s, rules, found, near):
             return True
         return close_quadrangle(front, s, rules, found, near)
-    if case == RIGHT:
+    if case == CASE_5:
         return close_right(front, s, rules, found, near)
-    if case == LEFT:
+    if case == CASE_6:
         return close_left(front, s, rules, found, near)
     return new_node(surface, front, s, rules, found, near, patch)

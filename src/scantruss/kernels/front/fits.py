@@ -21,7 +21,7 @@ from ..geometry.triangles import (
 )
 from ..geometry.vectors import Vector, across, along, cross, dot, norm, row, subtract, unit
 from ..surface.local_surface import Surface, linked
-from .front import LOOK_AT_EDGES, NODES, Front, edge_exists
+from .front import Front, edge_exists
 
 # how far from a triangle a line of the front that faces as it does may be and still be crossed [member lengths]
 FOLD_DISTANCE = 0.85
@@ -37,6 +37,7 @@ LOOSE_ALIGNMENT, STRICT_ALIGNMENT = -0.2, 0.5  # least cosine between a triangle
 LONGEST_EDGE, SHORTER_EDGE = 3.0, 1.2  # longest edge of a triangle; what strictness 1 takes off [member lengths]
 ROOM_BESIDE_EDGE = 0.25  # distance of a node of the front from a new edge at strictness 1 [member lengths]
 NO_SECTOR = 9.0  # stands for the angle of a node outside the unmeshed area; larger than a full turn [radian]
+NO_DIFFERENCE = 1e-9  # distance, and angle, below which two are the same [member lengths, radian]
 
 
 @kernel
@@ -45,7 +46,7 @@ def same_sheet(surface: Surface, front: Front, a: int, q: int, length: float) ->
     d = subtract(row(front.nodes, q), row(front.nodes, a))
     far = norm(d)
     na, nq = row(front.normals, a), row(front.normals, q)
-    if far < 1e-9 * length:
+    if far < NO_DIFFERENCE * length:
         return True
     flat = max(abs(dot(d, na)), abs(dot(d, nq))) / far
     facing = dot(na, nq)
@@ -60,7 +61,7 @@ def same_sheet(surface: Surface, front: Front, a: int, q: int, length: float) ->
 @kernel
 def faces_away(front: Front, normal: Vector, q: int) -> bool:
     """Whether a node lies on the other side of a sharp edge of a body, seen from a place of that normal."""
-    return front.count[LOOK_AT_EDGES] == 1 and dot(normal, row(front.normals, q)) < FACES_AWAY
+    return front.sharp_edges and dot(normal, row(front.normals, q)) < FACES_AWAY
 
 
 @kernel
@@ -110,7 +111,7 @@ def _sector(front: Front, leaving: int, q: int) -> float:
     place, normal = row(front.nodes, p), row(front.normals, p)
     base = subtract(row(front.nodes, front.head[leaving]), place)
     whole = angle_from(base, subtract(row(front.nodes, front.tail[front.previous[leaving]]), place), normal)
-    if front.tail[front.previous[leaving]] == front.head[leaving] or whole < 1e-9:
+    if front.tail[front.previous[leaving]] == front.head[leaving] or whole < NO_DIFFERENCE:
         whole = 2.0 * math.pi
     angle = angle_from(base, subtract(row(front.nodes, q), place), normal)
     return angle if angle < whole else NO_SECTOR
@@ -171,7 +172,7 @@ def fits(front: Front, s: int, p: int, found: np.ndarray, near: int, length: flo
         if _sector(front, front.next[after], a) >= NO_SECTOR:
             return False, -1
     else:
-        if p < front.count[NODES] and front.out[p] >= 0:
+        if p < front.counts.nodes and front.out[p] >= 0:
             passage = passage_of(front, s, p)
             if passage < 0:
                 return False, -1

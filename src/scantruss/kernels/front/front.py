@@ -17,15 +17,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...runtime.jit import kernel
+from ...runtime.jit import kernel, record_type
 from ..geometry.boxes import SearchBoxes, put
 from ..geometry.vectors import Vector
 
 GONE, ACTIVE, INACTIVE, WAITING = 0, 1, 2, 3  # states of a segment
 DONE, MORE, FULL = 0, 1, 2  # what `advance` returns
-NODES, SEGMENTS, TRIANGLES, FIRST, LAST = 0, 1, 2, 3, 4  # places of the counters in `Front.count`
-LOOK_AT_EDGES = 5  # place in it of 1 where the sharp edges of bodies are looked at, else 0
 MOST_NEAR_NODES = 400  # most front nodes looked at in one step
+# how many nodes, segments and triangles there are; the queue holds the segments from number `first` to `last` - 1, its end comes
+# before its beginning
+FRONT_COUNTS = record_type(nodes=np.int64, segments=np.int64, triangles=np.int64, first=np.int64, last=np.int64)
 
 
 class Rules(NamedTuple):
@@ -80,14 +81,15 @@ class Front(NamedTuple):
     corner: np.ndarray  #: (C,) last corner (3 t + k) at the node, -1: none
     corner_next: np.ndarray  #: (3 T,) another corner at the same node, -1: none
     queue: np.ndarray  #: (Q,) segments to be advanced
-    count: np.ndarray  # type: ignore[assignment]  #: (8,) counters; hides tuple.count
+    counts: np.record  #: FRONT_COUNTS
+    sharp_edges: bool  #: whether the sharp edges of bodies are looked at
     boxes: SearchBoxes  #: the nodes by box
 
 
 @kernel
 def propose_node(front: Front, place: Vector, normal: Vector, sample: int, on_boundary: bool) -> int:
     """Store a proposed node without adding it; returns its number."""
-    n = front.count[NODES]
+    n = front.counts.nodes
     for c in range(3):
         front.nodes[n, c] = place[c]
         front.normals[n, c] = normal[c]
@@ -101,16 +103,16 @@ def propose_node(front: Front, place: Vector, normal: Vector, sample: int, on_bo
 @kernel
 def add_node(front: Front) -> None:
     """Add the proposed node."""
-    n = front.count[NODES]
-    front.count[NODES] += 1
+    n = front.counts.nodes
+    front.counts.nodes += 1
     put(front.boxes, n, front.nodes[n, 0], front.nodes[n, 1], front.nodes[n, 2])
 
 
 @kernel
 def add_segment(front: Front, tail: int, head: int, state: int) -> int:
     """Add a front segment, not yet linked to its neighbours; active ones join the queue."""
-    s = front.count[SEGMENTS]
-    front.count[SEGMENTS] += 1
+    s = front.counts.segments
+    front.counts.segments += 1
     front.tail[s], front.head[s], front.state[s] = tail, head, state
     front.out_next[s] = front.out[tail]
     front.out[tail] = s
@@ -123,8 +125,8 @@ def add_segment(front: Front, tail: int, head: int, state: int) -> int:
 def enqueue(front: Front, s: int) -> None:
     """Put a segment at the end of the queue."""
     front.state[s] = ACTIVE
-    front.queue[front.count[LAST] % len(front.queue)] = s
-    front.count[LAST] += 1
+    front.queue[front.counts.last % len(front.queue)] = s
+    front.counts.last += 1
 
 
 @kernel
@@ -137,7 +139,7 @@ def link(front: Front, s: int, following: int) -> None:
 @kernel
 def add_chain(front: Front, nodes: np.ndarray, state: int) -> None:
     """Add the segments of a closed chain of nodes (K,), linked."""
-    count, first = len(nodes), front.count[SEGMENTS]
+    count, first = len(nodes), front.counts.segments
     for i in range(count):
         add_segment(front, nodes[i], nodes[(i + 1) % count], state)
     for i in range(count):
@@ -161,8 +163,8 @@ def remove_segment(front: Front, s: int) -> None:
 @kernel
 def add_triangle(front: Front, a: int, b: int, c: int) -> None:
     """Add a triangle to the grid."""
-    t = front.count[TRIANGLES]
-    front.count[TRIANGLES] += 1
+    t = front.counts.triangles
+    front.counts.triangles += 1
     for k in range(3):
         node = a if k == 0 else (b if k == 1 else c)
         front.triangles[t, k] = node

@@ -10,6 +10,9 @@ from ..geometry.vectors import cross, dot, norm, row, subtract, unit
 from .front import Front, add_triangle, edge_exists, link, remove_segment
 
 MOST_SEGMENTS_OF_GAP = 120  # most segments of a loop that is triangulated; the time grows with their cube
+# cosine between a triangle and the surface below which it costs more, and how much more
+FACING_OF_GAP, FACING_COST = 0.5, 2.0
+LONGEST_SIDE = 1.5  # longest side of a triangle that costs nothing [member lengths]
 
 
 @kernel
@@ -40,7 +43,11 @@ def triangle_cost(front: Front, a: int, b: int, c: int, length: float) -> float:
     face = unit(cross(subtract(pb, pa), subtract(pc, pa)))
     worst = min(dot(face, row(front.normals, a)), dot(face, row(front.normals, b)), dot(face, row(front.normals, c)))
     longest = max(norm(subtract(pb, pa)), norm(subtract(pc, pb)), norm(subtract(pa, pc))) / length
-    return (1.0 - shape_quality(pa, pb, pc)) + max(0.5 - worst, 0.0) * 2.0 + max(longest - 1.5, 0.0)
+    return (
+        (1.0 - shape_quality(pa, pb, pc))
+        + max(FACING_OF_GAP - worst, 0.0) * FACING_COST
+        + max(longest - LONGEST_SIDE, 0.0)
+    )
 
 
 @kernel

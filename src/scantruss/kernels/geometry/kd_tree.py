@@ -129,7 +129,7 @@ def _away(tree: KDTree, node: int, x: float, y: float, z: float) -> float:
 
 
 @kernel
-def nearest(
+def nearest_in_tree(
     tree: KDTree, x: float, y: float, z: float, most: int, stack: np.ndarray, found: np.ndarray, squares: np.ndarray
 ) -> int:
     """Find the `most` points nearest to a place, nearest first, and their squared distances; returns how many there are.
@@ -196,7 +196,9 @@ def nearest_others(tree: KDTree, neighbors: np.ndarray, squares: np.ndarray, beg
     most = neighbors.shape[1]
     stack, found, away = np.empty(2 * STACK_LEVELS, np.int64), np.empty(most + 1, np.int64), np.empty(most + 1)
     for p in range(begin, end):
-        count = nearest(tree, tree.points[p, 0], tree.points[p, 1], tree.points[p, 2], most + 1, stack, found, away)
+        count = nearest_in_tree(
+            tree, tree.points[p, 0], tree.points[p, 1], tree.points[p, 2], most + 1, stack, found, away
+        )
         held = 0
         for k in range(count):
             if found[k] != p and held < most:
@@ -214,5 +216,5 @@ def nearest_of_places(tree: KDTree, places: np.ndarray, rank: int, squares: np.n
     """
     stack, found, away = np.empty(2 * STACK_LEVELS, np.int64), np.empty(rank, np.int64), np.empty(rank)
     for i in range(len(places)):
-        last = nearest(tree, places[i, 0], places[i, 1], places[i, 2], rank, stack, found, away) - 1
+        last = nearest_in_tree(tree, places[i, 0], places[i, 1], places[i, 2], rank, stack, found, away) - 1
         squares[i], which[i] = away[last], tree.ids[found[last]]

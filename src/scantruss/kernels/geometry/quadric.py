@@ -1,23 +1,29 @@
 """Quadrics fitted to heights over a plane by weighted least squares; where the points do not determine one, a plane.
 
-The height over the point (a, b) of the plane is c0 + c1 a + c2 b + c3 a^2 + c4 a b + c5 b^2. The points of a fit are the rows of a
-buffer, a position in the columns 0 to 2 and the columns named below.
+The height over the point (a, b) of the plane is c0 + c1 a + c2 b + c3 a^2 + c4 a b + c5 b^2. The points of a fit are
+FIT_POINT records of a buffer.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from ...runtime.jit import kernel
-from .vectors import Vector, cross, dot
+from ...runtime.jit import kernel, record_type
+from .vectors import Vector, cross, dot, vector_of
 
-SQUARE = 3  # column of the squared distance from the middle of the fit
-WEIGHT = 4  # column of the weight of the point
-RESIDUAL = 5  # column of the height over the fitted surface
-PLANE_A, PLANE_B = 6, 7  # columns of the place in the plane [radii of the fit]
-HEIGHT = 8  # column of the height over the plane
-COLUMNS = 9  # columns of a buffer
+FIT_POINT = record_type(
+    place=(np.float64, 3),  # from the middle of the fit [scan unit]
+    square=np.float64,  # squared distance from there
+    weight=np.float64,
+    residual=np.float64,  # height over the fitted surface [scan unit]
+    a=np.float64,  # place in the plane [radii of the fit]
+    b=np.float64,
+    height=np.float64,  # over the plane [scan unit]
+)
 TERMS_OF_QUADRIC, TERMS_OF_PLANE = 6, 3  # coefficients of either surface
+# added to each diagonal element of normal equations, in the first one: it decides only what the points leave open
+REGULARIZATION = 1e-9
+LEAST_PIVOT = 1e-10  # pivot at or below which a system has no solution
 
 Coefficients = tuple[float, float, float, float, float, float]
 
@@ -28,8 +34,8 @@ def second_moments(buffer: np.ndarray, taken: int) -> tuple[float, float, float,
     total = cx = cy = cz = 0.0
     xx = xy = xz = yy = yz = zz = 0.0
     for i in range(taken):
-        w = buffer[i, WEIGHT]
-        x, y, z = buffer[i, 0], buffer[i, 1], buffer[i, 2]
+        w = buffer[i].weight
+        x, y, z = vector_of(buffer[i].place)
         wx, wy, wz = w * x, w * y, w * z
         total, cx, cy, cz = total + w, cx + wx, cy + wy, cz + wz
         xx, xy, xz = xx + wx * x, xy + wx * y, xz + wx * z
@@ -46,9 +52,9 @@ def project(buffer: np.ndarray, taken: int, radius: float, normal: Vector, u: Ve
     """Fill in the places of the points in the plane through the origin with a normal and a tangent u, and their heights over it."""
     v = cross(normal, u)
     for i in range(taken):
-        d = (buffer[i, 0], buffer[i, 1], buffer[i, 2])
-        buffer[i, PLANE_A], buffer[i, PLANE_B] = dot(d, u) / radius, dot(d, v) / radius
-        buffer[i, HEIGHT] = dot(d, normal)
+        d = vector_of(buffer[i].place)
+        buffer[i].a, buffer[i].b = dot(d, u) / radius, dot(d, v) / radius
+        buffer[i].height = dot(d, normal)
 
 
 @kernel
@@ -57,7 +63,7 @@ def normal_equations(buffer: np.ndarray, taken: int, matrix: np.ndarray) -> None
     m00 = m10 = m01 = m20 = m11 = m02 = m30 = m21 = m12 = m03 = m40 = m31 = m22 = m13 = m04 = 0.0
     z00 = z10 = z01 = z20 = z11 = z02 = 0.0
     for i in range(taken):
-        w, a, b, z = buffer[i, WEIGHT], buffer[i, PLANE_A], buffer[i, PLANE_B], buffer[i, HEIGHT]
+        w, a, b, z = buffer[i].weight, buffer[i].a, buffer[i].b, buffer[i].height
         wa, wb = w * a, w * b
         waa, wab, wbb = wa * a, wa * b, wb * b
         m00, m10, m01, m20, m11, m02 = m00 + w, m10 + wa, m01 + wb, m20 + waa, m11 + wab, m02 + wbb
@@ -80,11 +86,11 @@ def normal_equations(buffer: np.ndarray, taken: int, matrix: np.ndarray) -> None
 
 
 @kernel
-def solve(matrix: np.ndarray, size: int) -> bool:
+def solve_normal_equations(matrix: np.ndarray, size: int) -> bool:
     """Solve the symmetric system in matrix[:size, :size + 1] in place; the solution is left in its last column."""
     for i in range(size):
         pivot = matrix[i, i]
-        if pivot <= 1e-10:
+        if pivot <= LEAST_PIVOT:
             return False
         for r in range(i + 1, size):
             factor = matrix[r, i] / pivot
@@ -111,24 +117,24 @@ def fit_heights(
         normal_equations(buffer, taken, matrix)
         for r in range(size):
             matrix[r, size] = matrix[r, TERMS_OF_QUADRIC]
-            matrix[r, r] += 1e-9 * matrix[0, 0]
-        if solve(matrix, size) or size == 1:
+            matrix[r, r] += REGULARIZATION * matrix[0, 0]
+        if solve_normal_equations(matrix, size) or size == 1:
             break
         size = TERMS_OF_PLANE if size == TERMS_OF_QUADRIC else 1
     for c in range(TERMS_OF_QUADRIC):
         heights[c] = matrix[c, size] if c < size else 0.0
-    fitted = coefficients_from(heights, 0)
+    fitted = coefficients_of(heights)
     for i in range(taken):
-        buffer[i, RESIDUAL] = buffer[i, HEIGHT] - height_at(fitted, buffer[i, PLANE_A], buffer[i, PLANE_B])
+        buffer[i].residual = buffer[i].height - height_at(fitted, buffer[i].a, buffer[i].b)
     for c in range(1, TERMS_OF_QUADRIC):
         heights[c] /= radius if c < TERMS_OF_PLANE else radius * radius
     return size
 
 
 @kernel
-def coefficients_from(values: np.ndarray, first: int) -> Coefficients:
-    """The six coefficients of a quadric in a row, from a column on."""
-    return values[first], values[first + 1], values[first + 2], values[first + 3], values[first + 4], values[first + 5]
+def coefficients_of(values: np.ndarray) -> Coefficients:
+    """Six numbers (6,) as the coefficients of a quadric."""
+    return values[0], values[1], values[2], values[3], values[4], values[5]
 
 
 @kernel

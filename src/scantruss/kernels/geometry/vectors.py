@@ -18,21 +18,15 @@ def row(array: np.ndarray, i: int) -> Vector:
 
 
 @kernel
-def vector_from(values: np.ndarray, first: int) -> Vector:
-    """Three numbers of a row, from a column on."""
-    return values[first], values[first + 1], values[first + 2]
+def vector_of(values: np.ndarray) -> Vector:
+    """Three numbers (3,) as a vector."""
+    return values[0], values[1], values[2]
 
 
 @kernel
-def vector_in(array: np.ndarray, i: int, first: int) -> Vector:
-    """Three numbers of row i of an array, from a column on."""
-    return array[i, first], array[i, first + 1], array[i, first + 2]
-
-
-@kernel
-def put_vector(values: np.ndarray, first: int, vector: Vector) -> None:
-    """Write a vector into three columns of a row, from a column on."""
-    values[first], values[first + 1], values[first + 2] = vector
+def put_vector(values: np.ndarray, a: Vector) -> None:
+    """Write a vector into three numbers (3,)."""
+    values[0], values[1], values[2] = a
 
 
 @kernel

@@ -10,7 +10,7 @@ from ...runtime.jit import kernel
 from ..geometry.boxes import SearchBoxes, nearest, put
 from ..geometry.vectors import norm, row, subtract
 
-DOUBLINGS = 50  # times that a reach is doubled at most: from any box to all of them
+MOST_DOUBLINGS = 50  # times that a reach is doubled at most: from any box to all of them
 
 
 @kernel
@@ -26,13 +26,13 @@ def nearest_distances(
 ) -> None:
     """Fill in the distance (Q,) of each of the others (Q, 3) from the nearest place; the search radius is doubled from `near` on.
 
-    boxes : the places (P, 3) by box, at least one. Inf if the nearest is beyond `DOUBLINGS` of the first radius.
+    boxes : the places (P, 3) by box, at least one. Inf if the nearest is beyond `MOST_DOUBLINGS` of the first radius.
     """
     for q in range(len(others)):
         x, y, z = row(others, q)
         reach = near
         found = nearest(boxes, places, x, y, z, reach)
-        for _ in range(DOUBLINGS):
+        for _ in range(MOST_DOUBLINGS):
             if found >= 0:
                 break
             reach *= 2.0

@@ -15,6 +15,8 @@ from ..geometry.triangles import across_edge
 from ..geometry.vectors import Vector, cross, dot, row, subtract, unit
 
 ROUNDING = 1e-14  # relative error of a product of three differences, with a margin: forty times the last bit
+BALL_MARGIN = 1.000001  # by which balls around triangles are larger, whatever rounding did
+FOLDED_BACK = 1e-6  # cosine times the largest squared side by which two wings point apart
 
 
 @kernel
@@ -80,7 +82,7 @@ def wings_apart(edge: Vector, c: Vector, d: Vector) -> bool:
     if _certain_turn(edge, c, d) != 0:
         return True
     p, q = across_edge(edge, c), across_edge(edge, d)
-    return dot(p, q) < -1e-6 * max(dot(edge, edge), dot(c, c), dot(d, d))
+    return dot(p, q) < -FOLDED_BACK * max(dot(edge, edge), dot(c, c), dot(d, d))
 
 
 @kernel
@@ -171,14 +173,14 @@ def doubtful_pairs(
     count = 0
     for t in range(len(triangles)):
         x, y, z = row(middles, t)
-        reach = 1.000001 * (radii[t] + widest)
+        reach = BALL_MARGIN * (radii[t] + widest)
         for i in range(box_index(boxes, 0, x - reach), box_index(boxes, 0, x + reach) + 1):
             for j in range(box_index(boxes, 1, y - reach), box_index(boxes, 1, y + reach) + 1):
                 for k in range(box_index(boxes, 2, z - reach), box_index(boxes, 2, z + reach) + 1):
                     u = boxes.first[slot_of(boxes, i, j, k)]
                     while u >= 0:
                         d = subtract(row(middles, u), (x, y, z))
-                        touch = 1.000001 * (radii[t] + radii[u])
+                        touch = BALL_MARGIN * (radii[t] + radii[u])
                         if dot(d, d) <= touch * touch and not proved_apart(nodes, triangles, u, t):
                             if count == len(pairs):
                                 return count

@@ -16,6 +16,7 @@ from ..geometry.vectors import Vector, dot, norm, row, subtract
 MOST_ENTRIES = 1000  # most entries of a triangle on average, beyond which boxes are larger: some triangles are far longer than others
 BOX_GROWTHS = 60  # times that boxes are made twice as large at most: from any size to one box
 RADIUS_GROWTHS = 90  # times that a reach grows by half at most: from any box to all of them
+REACH_GROWS, LEAST_REACH = 1.5, 1e-3  # a reach grows by this, and is no less than so much of the first
 
 
 class TriangleBoxes(NamedTuple):
@@ -178,7 +179,7 @@ def plane_distances(
         for _ in range(RADIUS_GROWTHS):
             if count == wanted:
                 break
-            reach *= 1.5
+            reach *= REACH_GROWS
             count = nearest_points(boxes, points, place, reach, found, squares)
         if count < wanted:
             distance[q], noise[q], reach = math.inf, 0.0, near
@@ -190,4 +191,4 @@ def plane_distances(
         away = subtract(place, first)
         distance[q] = min(abs(dot(subtract(away, mean), normal)), norm(away))
         noise[q] = math.sqrt(off / wanted)
-        reach = max(1.5 * math.sqrt(squares[wanted - 1]), 1e-3 * near)
+        reach = max(REACH_GROWS * math.sqrt(squares[wanted - 1]), LEAST_REACH * near)

@@ -13,15 +13,19 @@ import numpy as np
 
 from ...runtime.jit import kernel
 from ..boundary.curves import Curves, slide
-from ..geometry.vectors import dot, subtract, vector_in
-from ..surface.folds import FOLD_WEIGHT, chord_energy, chord_slope, fold_energy, fold_slope
-from ..surface.local_surface import CENTRE, NORMAL, onto_patch
+from ..geometry.vectors import dot, subtract, vector_of
+from ..surface.folds import chord_energy, chord_slope, fold_energy, fold_slope
+from ..surface.local_surface import onto_patch
 from .grid import AT_REST, INTERIOR, ON_CURVE, Net
 
 FOUR_ROOT_3 = 4.0 * math.sqrt(3.0)  # makes the shape quality of a regular triangle 1 (Eq. 5)
-RELAXATION = 1.4  # over-relaxation: length of a step in that to the least energy of a node whose neighbours rest
+OVER_RELAXATION = 1.4  # over-relaxation: length of a step in that to the least energy of a node whose neighbours rest
 PATCH_REACH = 0.8  # distance from the centre of its patch beyond which a node is not moved [member lengths]
 SHORTEST_STEP = 1e-4  # shortest step that is made while nodes settle [member lengths]
+TRIANGLE_STIFFNESS = 1.3  # of the triangles at a node, where that of its members is their weight
+LONGEST_STEP = 0.3  # longest step of a node [member lengths]
+NODE_STEPS, SHORTENED = 2, 0.3  # steps of a node that are tried, each shorter than the one before by this
+WAKES_FROM = 0.1  # share of `enough` from which on the gain of a node wakes its neighbours
 
 
 @kernel
@@ -35,7 +39,7 @@ def star_energy(
     nodes = net.nodes
     gx = gy = gz = energy = 0.0  # of the members
     sx = sy = sz = shape = 0.0  # of the triangles
-    nx, ny, nz = vector_in(patches, v, NORMAL)
+    nx, ny, nz = vector_of(patches[v].normal)
     d, half = net.degree[v], 0.5 * length
     own = half * net.desired[v]
     w = net.ring[v, d - 1]
@@ -74,14 +78,14 @@ def star_energy(
             sx += h * (bx + cx) - f * (ey * uz - ez * uy)
             sy += h * (by + cy) - f * (ez * ux - ex * uz)
             sz += h * (bz + cz) - f * (ex * uy - ey * ux)
-    if patches[v, FOLD_WEIGHT] > 0.0:
+    if patches[v].fold_weight > 0.0:
         energy += fold_energy(patches, v, x, y, z)
         if slope:
             fx, fy, fz = fold_slope(patches, v, x, y, z)
             gx, gy, gz = gx + fx, gy + fy, gz + fz
     for i in range(d):
         w = net.ring[v, i]
-        if patches[v, FOLD_WEIGHT] > 0.0 or patches[w, FOLD_WEIGHT] > 0.0:
+        if patches[v].fold_weight > 0.0 or patches[w].fold_weight > 0.0:
             hx, hy, hz = 0.5 * (x + nodes[w, 0]), 0.5 * (y + nodes[w, 1]), 0.5 * (z + nodes[w, 2])
             energy += chord_energy(patches, v, w, hx, hy, hz)
             if slope:
@@ -105,34 +109,34 @@ def settle_node(
     x, y, z = net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2]
     before, gx, gy, gz = star_energy(net, patches, v, x, y, z, length, weight, True)
     if kind == INTERIOR:
-        nx, ny, nz = vector_in(patches, v, NORMAL)
+        nx, ny, nz = vector_of(patches[v].normal)
         across = gx * nx + gy * ny + gz * nz
         gx, gy, gz = gx - across * nx, gy - across * ny, gz - across * nz
     local = length * net.desired[v]
-    step = stride * local * local / (net.degree[v] * (weight + 1.3))
-    most = 0.3 * local
+    step = stride * local * local / (net.degree[v] * (weight + TRIANGLE_STIFFNESS))
+    most = LONGEST_STEP * local
     size = step * math.sqrt(gx * gx + gy * gy + gz * gz)
     if size < still * net.desired[v]:
         return 0.0
     if size > most:
         step *= most / size
     arc = net.arc[v]
-    for _ in range(2):
+    for _ in range(NODE_STEPS):
         place = (x - step * gx, y - step * gy, z - step * gz)
         if kind == ON_CURVE:
             arc, px, py, pz = slide(curves, net.curve[v], net.arc[v], most, place[0], place[1], place[2])
         else:
             px, py, pz = onto_patch(patches[v], place)
-            d = subtract((px, py, pz), vector_in(patches, v, CENTRE))
+            d = subtract((px, py, pz), vector_of(patches[v].centre))
             if dot(d, d) > PATCH_REACH * PATCH_REACH * local * local:
-                step *= 0.3
+                step *= SHORTENED
                 continue
         after = star_energy(net, patches, v, px, py, pz, length, weight, False)[0]
         if after < before:
             net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2] = px, py, pz
             net.arc[v] = arc
             return before - after
-        step *= 0.3
+        step *= SHORTENED
     return 0.0
 
 
@@ -162,7 +166,7 @@ def settle_some(
                 awake[v] = 0
                 gained = settle_node(net, patches, curves, v, length, weight, SHORTEST_STEP * length, stride)
                 gain += gained
-                if gained > 0.1 * enough:
+                if gained > WAKES_FROM * enough:
                     awake[v] = 1
                     for i in range(net.degree[v]):
                         awake[net.ring[v, i]] = 1

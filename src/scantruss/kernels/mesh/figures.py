@@ -17,7 +17,7 @@ def _angle_between(u: Vector, w: Vector) -> float:
 
 
 @kernel
-def angles_of(nodes: np.ndarray, triangles: np.ndarray, angles: np.ndarray) -> None:
+def angles_of_triangles(nodes: np.ndarray, triangles: np.ndarray, angles: np.ndarray) -> None:
     """Fill in the angle of each triangle (T, 3) at each of its nodes (T, 3) [degree]."""
     for t in range(len(triangles)):
         for k in range(3):

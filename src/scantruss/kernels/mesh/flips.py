@@ -10,6 +10,8 @@ from ...runtime.jit import kernel
 from ..geometry.vectors import Vector, cross, dot, norm, row, subtract
 from .grid import Net, flip, may_flip, wings
 
+LEAST_ANGLE_GAIN = 1e-9  # by how much a flip must raise the smallest angle [radian]
+
 
 @kernel
 def smallest_angle(a: Vector, b: Vector, c: Vector) -> float:
@@ -59,7 +61,7 @@ def flip_by_angle(net: Net, fold: float, rounds: int, changed: np.ndarray) -> in
                 u = net.ring[v, i]
                 i += 1
                 if v < u and changed[v] >= turn - 1 and changed[u] >= turn - 1:
-                    if may_flip(net, v, u) and gain_of_flip(net, v, u, fold) > 1e-9:
+                    if may_flip(net, v, u) and gain_of_flip(net, v, u, fold) > LEAST_ANGLE_GAIN:
                         right, left = wings(net, v, u)
                         flip(net, v, u)
                         count += 1

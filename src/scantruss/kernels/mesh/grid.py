@@ -129,7 +129,7 @@ def list_triangles(net: Net, triangles: np.ndarray) -> int:
 
 
 @kernel
-def place_of(net: Net, v: int, u: int) -> int:
+def place_in_ring(net: Net, v: int, u: int) -> int:
     """Position of node u in the ring of node v, -1 if they are not neighbours."""
     for i in range(net.degree[v]):
         if net.ring[v, i] == u:
@@ -140,13 +140,13 @@ def place_of(net: Net, v: int, u: int) -> int:
 @kernel
 def is_line(net: Net, v: int, u: int) -> bool:
     """Whether the member between two neighbours is part of a line."""
-    return net.line[v] != 0 and (net.line[v] >> place_of(net, v, u)) & 1 == 1
+    return net.line[v] != 0 and (net.line[v] >> place_in_ring(net, v, u)) & 1 == 1
 
 
 @kernel
 def mark_line(net: Net, v: int, u: int) -> None:
     """Make the member between two neighbours part of a line, as seen from node v."""
-    net.line[v] |= 1 << place_of(net, v, u)
+    net.line[v] |= 1 << place_in_ring(net, v, u)
 
 
 @kernel
@@ -165,7 +165,7 @@ def put_in(net: Net, v: int, i: int, u: int) -> None:
 @kernel
 def take_out(net: Net, v: int, u: int) -> None:
     """Remove node u from the ring of node v."""
-    i = place_of(net, v, u)
+    i = place_in_ring(net, v, u)
     line = net.line[v]
     if line != 0:
         net.line[v] = (line & ((1 << i) - 1)) | ((line >> (i + 1)) << i)
@@ -177,7 +177,7 @@ def take_out(net: Net, v: int, u: int) -> None:
 @kernel
 def wings(net: Net, a: int, b: int) -> tuple[int, int]:
     """Nodes right and left of the edge from a to b, in the triangles (a, right, b) and (a, b, left); -1 if there is no triangle."""
-    i, d = place_of(net, a, b), net.degree[a]
+    i, d = place_in_ring(net, a, b), net.degree[a]
     if net.is_open[a] == 1:
         return (net.ring[a, i - 1] if i > 0 else -1), (net.ring[a, i + 1] if i + 1 < d else -1)
     return net.ring[a, (i + d - 1) % d], net.ring[a, (i + 1) % d]
@@ -204,7 +204,7 @@ def may_flip(net: Net, a: int, b: int) -> bool:
         and net.degree[b] > lowest_degree(net, b)
         and net.degree[right] < most
         and net.degree[left] < most
-        and place_of(net, right, left) < 0
+        and place_in_ring(net, right, left) < 0
     )
 
 
@@ -214,8 +214,8 @@ def flip(net: Net, a: int, b: int) -> None:
     right, left = wings(net, a, b)
     take_out(net, a, b)
     take_out(net, b, a)
-    put_in(net, left, place_of(net, left, a) + 1, right)
-    put_in(net, right, place_of(net, right, b) + 1, left)
+    put_in(net, left, place_in_ring(net, left, a) + 1, right)
+    put_in(net, right, place_in_ring(net, right, b) + 1, left)
 
 
 @kernel
@@ -233,7 +233,7 @@ def may_collapse(net: Net, a: int, b: int) -> bool:
         u = net.ring[b, i]
         if net.kind[u] == LOCKED:
             return False
-        if place_of(net, a, u) >= 0:
+        if place_in_ring(net, a, u) >= 0:
             common += 1
     on_boundary = right < 0 or left < 0
     if common != (1 if on_boundary else 2):
@@ -257,16 +257,16 @@ def collapse(net: Net, a: int, b: int) -> None:
         begin = 1 if left < 0 else 0
         others = d - 1
     else:
-        begin = place_of(net, b, a) + 1
+        begin = place_in_ring(net, b, a) + 1
         others = d - 1
-    i = place_of(net, a, b)
+    i = place_in_ring(net, a, b)
     take_out(net, a, b)
     for step in range(others):
         u = net.ring[b, (begin + step) % d]
         if u in (right, left):
             take_out(net, u, b)
         else:
-            net.ring[u, place_of(net, u, b)] = a
+            net.ring[u, place_in_ring(net, u, b)] = a
             put_in(net, a, i, u)
             if (line >> ((begin + step) % d)) & 1 == 1:
                 net.line[a] |= 1 << i
@@ -308,17 +308,17 @@ def split(net: Net, a: int, b: int) -> int:
     net.spare[0] -= 1
     m = net.free[net.spare[0]]
     net.in_use[0] = max(net.in_use[0], m + 1)
-    net.ring[a, place_of(net, a, b)] = m
-    net.ring[b, place_of(net, b, a)] = m
+    net.ring[a, place_in_ring(net, a, b)] = m
+    net.ring[b, place_in_ring(net, b, a)] = m
     net.degree[m] = net.line[m] = 0
     curves = right < 0 or left < 0
     net.is_open[m], net.kind[m] = (1, ON_CURVE) if curves else (0, INTERIOR)
     net.curve[m] = net.curve[a] if curves else -1
     net.desired[m] = 0.5 * (net.desired[a] + net.desired[b])
     if right >= 0:
-        put_in(net, right, place_of(net, right, b) + 1, m)
+        put_in(net, right, place_in_ring(net, right, b) + 1, m)
     if left >= 0:
-        put_in(net, left, place_of(net, left, a) + 1, m)
+        put_in(net, left, place_in_ring(net, left, a) + 1, m)
     around = (a, right, b, left) if left < 0 or right >= 0 else (b, left, a, -1)
     for u in around:
         if u >= 0:

@@ -6,6 +6,8 @@ from ...runtime.jit import kernel
 from ..boundary.curves import Curves, is_open
 from .grid import Net
 
+SAME_DISTANCE = 1e-6  # difference of two squared distances below which they are the same [square of the line]
+
 
 @kernel
 def arc_on_line(net: Net, curves: Curves, v: int, a: int, b: int) -> float:
@@ -19,7 +21,7 @@ def arc_on_line(net: Net, curves: Curves, v: int, a: int, b: int) -> float:
         before += (net.nodes[a, c] - curves.points[first, c]) ** 2
         after += (net.nodes[a, c] - curves.points[last, c]) ** 2
     total = curves.total[curve]
-    if abs(before - after) > 1e-6 * total * total:
+    if abs(before - after) > SAME_DISTANCE * total * total:
         return 0.0 if before < after else total
     return 0.0 if net.arc[b] < 0.5 * total else total  # a line that ends where it starts
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from ...runtime.jit import kernel
 from ..boundary.curves import Curves, at_arc
-from ..geometry.vectors import cross, dot, fill_row, norm, row, subtract
-from .equalize import RELAXATION, settle_node
+from ..geometry.vectors import cross, dot, norm, row, subtract
+from .equalize import OVER_RELAXATION, settle_node
 from .grid import (
     ON_CURVE,
     Net,
@@ -37,12 +37,13 @@ SETTLING_SWEEPS = 2  # sweeps in which all nodes around a move settle
 EARLY_ALLOWANCE = (0.35, 1.2, 2.0)
 # growth of the energy by a flip, collapse or split up to which it goes on once all nodes around have settled
 LATE_ALLOWANCE = (0.06, 0.3, 0.5)
-STRAINED = 0.15  # relative deviation of a member from its desired length above which its nodes ask for moves
+STRAINED_MEMBER = 0.15  # relative deviation of a member from its desired length above which its nodes ask for moves
 SHORTEST_SPLIT = 1.05  # length of the shortest member that is split [desired length]
 # length from which on a line between two nodes at rest keeps a node between them [desired length]
 LONGEST_LINE_MEMBER = 1.5
 LONGEST_COLLAPSED = 1.1  # length of the longest member that is collapsed [desired length]
 SHORTEST_TRIAL_STEP = 0.005  # shortest step that is made in a trial [member lengths]
+LEAST_PAID = 1e-4  # energy that a move must gain
 
 
 @kernel
@@ -123,7 +124,7 @@ def make_move(net: Net, patches: np.ndarray, curves: Curves, scratch: Scratch, m
         collapse(net, a, b)
         return -1
     added = split(net, a, b)
-    fill_row(patches[added], patches[a])
+    patches[added] = patches[a]
     place_between(net, curves, added, a, b)
     net.ideal[added] = 4 if net.is_open[added] == 1 else 6
     scratch.held[added] = scratch.trial[0]
@@ -187,14 +188,14 @@ def try_move(
     for turn in range(1 + SETTLING_SWEEPS):
         for i in range(min(4, scratch.gathered[0]) if turn == 0 else scratch.gathered[0]):
             settle_node(
-                net, patches, curves, scratch.around[i], length, weight, SHORTEST_TRIAL_STEP * length, RELAXATION
+                net, patches, curves, scratch.around[i], length, weight, SHORTEST_TRIAL_STEP * length, OVER_RELAXATION
             )
         if turn == 0 and added >= 0:
-            settle_node(net, patches, curves, added, length, weight, SHORTEST_TRIAL_STEP * length, RELAXATION)
+            settle_node(net, patches, curves, added, length, weight, SHORTEST_TRIAL_STEP * length, OVER_RELAXATION)
         after = local_energy(net, patches, scratch, length, weight)
         if after > before + (EARLY_ALLOWANCE[move] if turn == 0 else LATE_ALLOWANCE[move]):
             break
-    if after < before - 1e-4 and (move != COLLAPSE or triangles_across(net, patches, scratch, length) <= across):
+    if after < before - LEAST_PAID and (move != COLLAPSE or triangles_across(net, patches, scratch, length) <= across):
         for i in range(scratch.gathered[0]):
             scratch.tried[scratch.around[i]] = 0
         scratch.paid[0] += 1
@@ -211,7 +212,7 @@ def is_regular(net: Net, v: int, length: float) -> bool:
     for i in range(net.degree[v]):
         w = net.ring[v, i]
         size = norm(subtract(row(net.nodes, w), row(net.nodes, v)))
-        if abs(size / target_length(net, v, w, length) - 1.0) > STRAINED:
+        if abs(size / target_length(net, v, w, length) - 1.0) > STRAINED_MEMBER:
             return False
     return True
 
@@ -259,7 +260,7 @@ def move_at(net: Net, v: int, u: int, way: int, length: float) -> tuple[int, int
 
 
 @kernel
-def search(
+def search_moves(
     net: Net,
     patches: np.ndarray,
     curves: Curves,

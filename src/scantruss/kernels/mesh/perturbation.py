@@ -10,8 +10,8 @@ import numpy as np
 from ...runtime.jit import kernel
 from ..boundary.curves import Curves
 from ..geometry.vectors import fill_row
-from .equalize import RELAXATION, settle_node
-from .grid import LOCKED, Net, place_of, wings
+from .equalize import OVER_RELAXATION, settle_node
+from .grid import LOCKED, Net, place_in_ring, wings
 from .local_search import (
     COLLAPSE,
     FLIP,
@@ -36,7 +36,12 @@ SEARCH_ROUNDS = 2  # most rounds of settling and searching
 AREA_SWEEPS = 2  # sweeps in which the area settles in a round
 ALLOWANCE_SETTLED = 2.2  # energy that random moves may cost once the area has settled; what costs more never pays
 ALLOWANCE_SEARCHED = 0.2  # energy that they may cost once the area has been searched; what costs more hardly ever pays
-LISTED, UNFIT, OUT_OF_BOUNDS = 0, 1, 2  # what became of listing an area
+AREA_LISTED, AREA_UNFIT, AREA_OUT_OF_BOUNDS = 0, 1, 2  # what became of listing an area
+# moves that one is drawn of, and how many of these are flips; then a collapse and a split
+MOVES_DRAWN, FLIPS_DRAWN = 5, 3
+MOST_KEPT_AT_NODE = 20  # most moves that are kept at one node before the next one is searched
+SMALLEST_FALL = 1e-4  # fall of the energy that counts
+CHANCES = 100_000  # numbers that chance is drawn of
 
 
 class Area(NamedTuple):
@@ -56,7 +61,7 @@ class Area(NamedTuple):
     curve: np.ndarray  #: (A,) int64
     ideal: np.ndarray  #: (A,) int64
     line: np.ndarray  #: (A,) int64
-    patches: np.ndarray  #: (A, PATCH_COLUMNS) their local surfaces: a node that is freed may come back elsewhere
+    patches: np.ndarray  #: (A,) SURFACE_PATCH, their local surfaces: a node that is freed may come back elsewhere
     free: np.ndarray  #: (SAVED_FREE_NODES,) int64 the top of the stack of free nodes
     saved: np.ndarray  #: (1,) int64 how many of these are saved
     spare: np.ndarray  #: (1,) int64 how many nodes were free
@@ -75,7 +80,7 @@ def random_choice(area: Area, choices: int) -> int:
 
 @kernel
 def list_area(net: Net, patches: np.ndarray, area: Area, v: int) -> int:
-    """Save the nodes around a node: LISTED, UNFIT if there are too many or a defect is among them, or OUT_OF_BOUNDS if one is."""
+    """Save the nodes around a node; AREA_UNFIT if there are too many or a defect is among them, AREA_OUT_OF_BOUNDS if one is."""
     area.number[0] += 1
     stamp = area.number[0]
     area.around[0] = v
@@ -85,16 +90,16 @@ def list_area(net: Net, patches: np.ndarray, area: Area, v: int) -> int:
         u = area.around[at]
         at += 1
         if area.out[u] == 1:
-            return OUT_OF_BOUNDS
+            return AREA_OUT_OF_BOUNDS
         if net.kind[u] == LOCKED:
-            return UNFIT
+            return AREA_UNFIT
         if area.away[u] == AREA_RINGS:
             continue
         for i in range(net.degree[u]):
             w = net.ring[u, i]
             if area.mark[w] != stamp:
                 if count == len(area.around):
-                    return UNFIT
+                    return AREA_UNFIT
                 area.mark[w], area.away[w] = stamp, area.away[u] + 1
                 area.around[count] = w
                 count += 1
@@ -107,12 +112,12 @@ def list_area(net: Net, patches: np.ndarray, area: Area, v: int) -> int:
         fill_row(area.ring[k], net.ring[u])
         area.degree[k], area.is_open[k], area.kind[k] = net.degree[u], net.is_open[u], net.kind[u]
         area.curve[k], area.ideal[k], area.line[k] = net.curve[u], net.ideal[u], net.line[u]
-        fill_row(area.patches[k], patches[u])
+        area.patches[k] = patches[u]
     free = net.spare[0]
     area.spare[0], area.saved[0] = free, min(free, SAVED_FREE_NODES)
     for k in range(area.saved[0]):
         area.free[k] = net.free[free - 1 - k]
-    return LISTED
+    return AREA_LISTED
 
 
 @kernel
@@ -131,7 +136,7 @@ def put_area_back(net: Net, patches: np.ndarray, area: Area) -> None:
         fill_row(net.ring[u], area.ring[k])
         net.degree[u], net.is_open[u], net.kind[u] = area.degree[k], area.is_open[k], area.kind[k]
         net.curve[u], net.ideal[u], net.line[u] = area.curve[k], area.ideal[k], area.line[k]
-        fill_row(patches[u], area.patches[k])
+        patches[u] = area.patches[k]
 
 
 @kernel
@@ -188,8 +193,8 @@ def move_at_random(net: Net, patches: np.ndarray, curves: Curves, scratch: Scrat
         if net.degree[a] == 0:
             continue
         b = net.ring[a, random_choice(area, net.degree[a])]
-        kind = random_choice(area, 5)
-        move = FLIP if kind < 3 else (COLLAPSE if kind == 3 else SPLIT)
+        kind = random_choice(area, MOVES_DRAWN)
+        move = FLIP if kind < FLIPS_DRAWN else (COLLAPSE if kind == FLIPS_DRAWN else SPLIT)
         if is_allowed(net, move, a, b, length) and is_within(net, area, a, b):
             gather(net, scratch, a, b)
             added = make_move(net, patches, curves, scratch, move, a, b)
@@ -207,7 +212,7 @@ def settle_area(net: Net, patches: np.ndarray, curves: Curves, area: Area, lengt
             listed = k < area.gathered[0]
             v = area.around[k] if listed else added_node(net, area, k - area.gathered[0])
             if v >= 0 and net.degree[v] > 0 and area.away[v] < AREA_RINGS:
-                settle_node(net, patches, curves, v, length, weight, SHORTEST_TRIAL_STEP * length, RELAXATION)
+                settle_node(net, patches, curves, v, length, weight, SHORTEST_TRIAL_STEP * length, OVER_RELAXATION)
 
 
 @kernel
@@ -231,7 +236,7 @@ def search_area(
         if scratch.tried[v] == 1 or is_regular(net, v, length):
             continue
         i = 0
-        while i < 4 * net.degree[v] and kept < 20:  # between two moves that are kept, i rises
+        while i < 4 * net.degree[v] and kept < MOST_KEPT_AT_NODE:  # between two moves that are kept, i rises
             u, way = net.ring[v, i // 4], i % 4
             if way == 0 and scratch.tried[u] == 1:
                 i += 4  # this edge was tried from its other end
@@ -264,7 +269,7 @@ def is_as_before(net: Net, area: Area) -> bool:
         if net.degree[v] != area.degree[k]:
             return False
         for i in range(net.degree[v]):
-            if place_of(net, v, area.ring[k, i]) < 0:
+            if place_in_ring(net, v, area.ring[k, i]) < 0:
                 return False
     return True
 
@@ -308,7 +313,9 @@ def perturb(
     settle_area(net, patches, curves, area, length, weight)
     after = area_energy(net, patches, scratch, area, length, weight)
     more = area.spare[0] - net.spare[0]
-    luck = -temperature * math.log((random_choice(area, 100000) + 1.0) / 100001.0) if temperature > 0.0 else -1e-4
+    luck = -SMALLEST_FALL
+    if temperature > 0.0:
+        luck = -temperature * math.log((random_choice(area, CHANCES) + 1.0) / (CHANCES + 1.0))
     if after - before < worth * more - bend * more * more + luck:
         area.paid[0] += 1
         return True
@@ -345,11 +352,11 @@ def perturb_all(
     for v in range(net.in_use[0]):
         if not waiting[v] or area.out[v] == 1:
             continue
-        listed = UNFIT
+        listed = AREA_UNFIT
         if net.degree[v] > 0 and net.degree[v] != net.ideal[v]:
             listed = list_area(net, patches, area, v)
-        waiting[v] = listed == OUT_OF_BOUNDS
-        if listed == LISTED:
+        waiting[v] = listed == AREA_OUT_OF_BOUNDS
+        if listed == AREA_LISTED:
             worth = share + price * (strain - 0.5 * (free - net.spare[0]) / count)
             perturb(
                 net, patches, curves, scratch, area, length, weight, worth, 0.25 * price / count, temperature, allowance

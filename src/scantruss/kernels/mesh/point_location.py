@@ -6,13 +6,14 @@ import numpy as np
 
 from ...runtime.jit import kernel
 from ..boundary.curves import Curves, nearest_on_curves, slide
-from ..geometry.vectors import fill_row, norm, row, subtract
+from ..geometry.vectors import norm, row, subtract, vector_of
 from ..surface.folds import PLANES_REACH, add_fold
-from ..surface.local_surface import IS_FITTED, NEAREST_SAMPLE, Surface, fit_patch, onto_patch, walk
+from ..surface.local_surface import SURFACE_PATCH, Surface, fit_patch, onto_patch, walk
 from ..surface.size_field import length_at
 from .grid import AT_REST, INTERIOR, ON_CURVE, Net
 
 FARTHEST_PATCH = 0.5  # distance of a new patch from its node above which it is of another sheet [member lengths]
+SAME_CORNER = 1e-6  # distance from a corner within which a node stands on it [member lengths]
 
 
 @kernel
@@ -41,22 +42,20 @@ def locate_nodes(
             continue
         queue[0], count, at = seed, 1, 0
         located[seed] = 1
-        patches[seed, NEAREST_SAMPLE] = nearest_sample(
-            surface, net.nodes[seed, 0], net.nodes[seed, 1], net.nodes[seed, 2]
-        )
+        patches[seed].sample = nearest_sample(surface, net.nodes[seed, 0], net.nodes[seed, 1], net.nodes[seed, 2])
         while at < count:
             v = queue[at]
             at += 1
             place = row(net.nodes, v)
-            sample = walk(surface, int(patches[v, NEAREST_SAMPLE]), place)
+            sample = walk(surface, patches[v].sample, place)
             if norm(subtract(row(surface.mean, sample), place)) > 0.5 * length:
                 sample = nearest_sample(surface, place[0], place[1], place[2])
-            patches[v, NEAREST_SAMPLE] = sample
+            patches[v].sample = sample
             for i in range(net.degree[v]):
                 u = net.ring[v, i]
                 if located[u] == 0:
                     located[u] = 1
-                    patches[u, NEAREST_SAMPLE] = sample
+                    patches[u].sample = sample
                     queue[count] = u
                     count += 1
 
@@ -74,7 +73,7 @@ def locate_on_boundary(net: Net, curves: Curves, corners: np.ndarray, fixed: np.
         net.curve[v], net.arc[v] = curve, arc
         free = not fixed[v] and net.line[v] == 0
         for k in range(len(corners)):
-            free = free and norm(subtract(row(corners, k), place)) > 1e-6 * length
+            free = free and norm(subtract(row(corners, k), place)) > SAME_CORNER * length
         if free:
             net.kind[v] = ON_CURVE
 
@@ -88,20 +87,20 @@ def renew_patches(
     A new patch far from its node is of another sheet or follows too few points: the old one is kept.
     """
     count = 0
-    before = np.empty(patches.shape[1])
+    before = np.empty(1, SURFACE_PATCH)
     for v in range(begin, end):
         if net.degree[v] > 0:
             place = row(net.nodes, v)
-            if patches[v, IS_FITTED] == 0.0 or norm(subtract(place, row(patches, v))) > near * net.desired[v]:
-                fill_row(before, patches[v])
-                fit_patch(surface, patches[v], int(patches[v, NEAREST_SAMPLE]), place)
+            if not patches[v].is_fitted or norm(subtract(place, vector_of(patches[v].centre))) > near * net.desired[v]:
+                before[0] = patches[v]
+                fit_patch(surface, patches[v], patches[v].sample, place)
                 add_fold(surface, patches[v], PLANES_REACH, strength)
                 local = surface.length * net.desired[v]
                 if (
-                    before[IS_FITTED] != 0.0
+                    before[0].is_fitted
                     and norm(subtract(place, onto_patch(patches[v], place))) > FARTHEST_PATCH * local
                 ):
-                    fill_row(patches[v], before)
+                    patches[v] = before[0]
                 count += 1
     return count
 
@@ -111,7 +110,7 @@ def renew_lengths(net: Net, surface: Surface, patches: np.ndarray, begin: int, e
     """Look up the desired member length at each node from `begin` to `end` - 1."""
     for v in range(begin, end):
         if net.degree[v] > 0:
-            net.desired[v] = length_at(surface, int(patches[v, NEAREST_SAMPLE]), row(net.nodes, v))
+            net.desired[v] = length_at(surface, patches[v].sample, row(net.nodes, v))
 
 
 @kernel

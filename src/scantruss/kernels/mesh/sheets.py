@@ -9,21 +9,22 @@ from ..geometry.boxes import SearchBoxes, search
 from ..geometry.vectors import dot, row, subtract
 from ..surface.local_surface import Surface, flood
 
-AWAY = 2.0  # what a distance counts to a node on the other side of a fold of more than 90 degrees
+COST_ACROSS_FOLD = 2.0  # what a distance counts to a node on the other side of a fold of more than 90 degrees
+MOST_SAMPLES_NEAR_NODE = 512  # most samples around a node
 
 
 @kernel
 def nearest_nodes(surface: Surface, boxes: SearchBoxes, nodes: np.ndarray, reach: float, nearest: np.ndarray) -> None:
     """Find the nearest node (V, 3) of each sample within `reach` over the links of its own sheet; -1 if there is none.
 
-    A node on the other side of a fold is `AWAY` times as far: past the end of a wall that is thin, or a gap that is narrow, one on the
-    other side may be nearer than the sample's own.
+    A node on the other side of a fold counts as `COST_ACROSS_FOLD` times as far: at the end of a thin wall, or of a narrow gap, one
+    on the other side may be nearer than the sample's own.
 
     boxes : of the samples. nearest : (S,) int64, filled.
     """
     nearest[:] = -1
     distance = np.empty(len(nearest))
-    found = np.empty(512, np.int64)
+    found = np.empty(MOST_SAMPLES_NEAR_NODE, np.int64)
     for v in range(len(nodes)):
         place = row(nodes, v)
         near, least = -1, 1e300
@@ -38,7 +39,7 @@ def nearest_nodes(surface: Surface, boxes: SearchBoxes, nodes: np.ndarray, reach
                 d = subtract(row(surface.mean, s), place)
                 dd = dot(d, d)
                 if dot(row(surface.normals, s), row(surface.normals, near)) < 0.0:
-                    dd *= AWAY * AWAY
+                    dd *= COST_ACROSS_FOLD * COST_ACROSS_FOLD
                 if nearest[s] < 0 or dd < distance[s]:
                     nearest[s], distance[s] = v, dd
 

@@ -8,10 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ...runtime.jit import kernel
-from ..geometry.quadric import coefficients_from, height_at
-from ..geometry.vectors import Vector, cross, dot, norm, row, subtract
-from ..surface.folds import FOLD_WEIGHT, chord_energy, fold_energy
-from ..surface.local_surface import CENTRE, HEIGHTS, NORMAL, TANGENT
+from ..geometry.quadric import coefficients_of, height_at
+from ..geometry.vectors import Vector, cross, dot, norm, row, subtract, vector_of
+from ..surface.folds import chord_energy, fold_energy
 from .equalize import FOUR_ROOT_3
 from .grid import Net, target_length, wings
 
@@ -139,7 +138,7 @@ def local_energy(net: Net, patches: np.ndarray, scratch: Scratch, length: float,
             if at >= 0 and not counted:
                 stretch = math.sqrt(cc) / target_length(net, v, w, length) - 1.0
                 energy += weight * stretch * stretch
-                if patches[v, FOLD_WEIGHT] > 0.0 or patches[w, FOLD_WEIGHT] > 0.0:
+                if patches[v].fold_weight > 0.0 or patches[w].fold_weight > 0.0:
                     hx, hy, hz = nodes[v, 0] + 0.5 * cx, nodes[v, 1] + 0.5 * cy, nodes[v, 2] + 0.5 * cz
                     energy += chord_energy(patches, v, w, hx, hy, hz)
             if at == 0 and not closed:
@@ -185,10 +184,10 @@ def total_energy(
 @kernel
 def off_patch(patches: np.ndarray, v: int, place: Vector) -> float:
     """Distance of a place from the patch of a node, along the normal of its plane."""
-    d = subtract(place, (patches[v, CENTRE], patches[v, CENTRE + 1], patches[v, CENTRE + 2]))
-    normal = (patches[v, NORMAL], patches[v, NORMAL + 1], patches[v, NORMAL + 2])
-    u = (patches[v, TANGENT], patches[v, TANGENT + 1], patches[v, TANGENT + 2])
-    heights = coefficients_from(patches[v], HEIGHTS)
+    patch = patches[v]
+    d = subtract(place, vector_of(patch.centre))
+    normal, u = vector_of(patch.normal), vector_of(patch.tangent)
+    heights = coefficients_of(patch.heights)
     return abs(dot(d, normal) - height_at(heights, dot(d, u), dot(d, cross(normal, u))))
 
 

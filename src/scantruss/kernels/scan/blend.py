@@ -7,7 +7,9 @@ import numpy as np
 from ...runtime.jit import kernel
 from ..geometry.boxes import SearchBoxes, nearest
 from ..geometry.vectors import dot, row, subtract
-from .overlap import moved, turned
+from .overlap import moved, turned_by_motion
+
+SAME_SIDE = 0.3  # cosine between the normals of two scans below which they see two sides of something thin
 
 
 @kernel
@@ -75,7 +77,7 @@ def add_layer(
         m = row(place_normals, n)
         d = subtract(q, row(places, n))
         rise = dot(d, m)
-        if abs(rise) > off or turn * dot(turned(back, row(normals, own[p])), m) < 0.3:
+        if abs(rise) > off or turn * dot(turned_by_motion(back, row(normals, own[p])), m) < SAME_SIDE:
             continue
         if depth[n] > deep[p] or (depth[n] == deep[p] and first == 1):
             kept[p] = 0

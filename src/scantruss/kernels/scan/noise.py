@@ -6,13 +6,16 @@ import numpy as np
 
 from ...runtime.jit import kernel
 from ..geometry.kd_tree import STACK_LEVELS, KDTree
-from ..geometry.quadric import COLUMNS, RESIDUAL, SQUARE
+from ..geometry.quadric import FIT_POINT
 from ..geometry.vectors import along, dot, row, subtract, unit
-from ..surface.patches import Patches, fit, foot, gather
+from ..surface.patches import Patches, fit, foot, gather_around
 
 MOST_AROUND = 600  # most points around a place
 RADIUS_RATIO = 1.3  # from one radius to the next narrower one
 NOISE_PATCH_FITS = 2  # fits of a patch, the second with less weight for points off the first
+LEAST_THICKNESS = 1e-9  # of a patch whose points lie exactly on it [radii]
+LEAST_NEARNESS = 1e-3  # weight of a patch at the edge of which a point lies
+OFF_PATCH_SQUARE = 9.0  # squared distance from a patch at which it weighs a quarter [thicknesses]
 
 
 @kernel
@@ -39,14 +42,14 @@ def fit_patches(
     flatness : (C,), filled with the kurtosis of the distances of the points from each patch, see `_flatness`
     """
     stack, found = np.empty(2 * STACK_LEVELS, np.int64), np.empty(MOST_AROUND, np.int64)
-    buffer, matrix = np.zeros((MOST_AROUND, COLUMNS)), np.zeros((6, 7))
+    buffer, matrix = np.zeros(MOST_AROUND, FIT_POINT), np.zeros((6, 7))
     for i in range(begin, end):
         place = row(tree.points, centres[i])
-        taken = gather(tree, place, widest * radii[i], -1, stack, found, buffer)
+        taken = gather_around(tree, place, widest * radii[i], -1, stack, found, buffer)
         share = widest
         while taken == MOST_AROUND and share > 1.0:  # the share falls to one
             share = max(share / RADIUS_RATIO, 1.0)
-            taken = gather(tree, place, share * radii[i], -1, stack, found, buffer)
+            taken = gather_around(tree, place, share * radii[i], -1, stack, found, buffer)
         while True:  # the share falls to one
             fit(buffer, taken, share * radii[i], NOISE_PATCH_FITS, patches, i, matrix)
             if patches.rms[i] <= usual[i] or share <= 1.0:
@@ -60,8 +63,8 @@ def _flatness(buffer: np.ndarray, taken: int, radius: float) -> float:
     """Kurtosis of the distances from a patch, fourth moment over squared variance: 3 for noise, 1 for points at two distances."""
     total = second = fourth = 0.0
     for i in range(taken):
-        w = max(1.0 - buffer[i, SQUARE] / (radius * radius), 0.0)
-        square = buffer[i, RESIDUAL] * buffer[i, RESIDUAL]
+        w = max(1.0 - buffer[i].square / (radius * radius), 0.0)
+        square = buffer[i].residual * buffer[i].residual
         total, second, fourth = total + w, second + w * square, fourth + w * square * square
     return fourth * total / (second * second) if second > 0.0 else 3.0
 
@@ -92,9 +95,9 @@ def onto_patches(
             at, normal = foot(patches, number[n], d)
             e = subtract(at, d)
             radius = patches.radius[number[n]]
-            thick = max(patches.rms[number[n]], 1e-9 * radius)
-            near = max(1.0 - dot(d, d) / (radius * radius), 1e-3)
-            off = 1.0 + dot(e, e) / (9.0 * thick * thick)
+            thick = max(patches.rms[number[n]], LEAST_THICKNESS * radius)
+            near = max(1.0 - dot(d, d) / (radius * radius), LEAST_NEARNESS)
+            off = 1.0 + dot(e, e) / (OFF_PATCH_SQUARE * thick * thick)
             weight = near * near / (thick * thick * thick * thick * off * off)
             total += weight
             shift = along(shift, weight, e)

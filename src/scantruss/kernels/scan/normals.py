@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from ...runtime.jit import kernel
-from ..geometry.kd_tree import STACK_LEVELS, KDTree, nearest
+from ..geometry.kd_tree import STACK_LEVELS, KDTree, nearest_in_tree
 from ..geometry.vectors import dot, row, subtract
+
+RISE_WEIGHT = 16.0  # of the squared rise over the tangent plane, against the squared distance
 
 
 @kernel
@@ -21,11 +23,11 @@ def turn_like_beside(
     for p in range(begin, end):
         place, normal = row(points, p), row(normals, p)
         best, side = np.inf, 1.0
-        for k in range(nearest(tree, place[0], place[1], place[2], beside, stack, found, squares)):
+        for k in range(nearest_in_tree(tree, place[0], place[1], place[2], beside, stack, found, squares)):
             other = row(settled, found[k])
             rise = dot(subtract(row(tree.points, found[k]), place), normal)
             agree = dot(normal, other)
-            cost = (squares[k] + 16.0 * rise * rise) * (2.0 - abs(agree))
+            cost = (squares[k] + RISE_WEIGHT * rise * rise) * (2.0 - abs(agree))
             if cost < best:
                 best, side = cost, agree
         if side < 0.0:

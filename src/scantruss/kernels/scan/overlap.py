@@ -10,17 +10,19 @@ from ...runtime.jit import kernel
 from ..geometry.boxes import SearchBoxes, nearest, search
 from ..geometry.vectors import Vector, cross, dot, row, subtract
 
-MOTION = 6  # numbers of a motion: three of rotation, three of translation; in the sums of a step the residual follows
+# numbers of a motion: three of rotation, three of translation; in the sums of a step the residual follows
+MOTION_NUMBERS = 6
 SLOPE_OF_PAIR = 0.6  # cosine of the angle between the normals of two places above which they make a pair
 SAME_SLOPE = 0.75  # cosine of the angle between two surfaces above which they agree
 OTHER_SIDE = -0.2  # cosine of that angle below which a point lies on the other side of a thin body
 OVER_PLACE = 1.5  # distance from a place along its surface within which a point lies over it [spacings]
+MOST_PLACES_NEAR_POINT = 256  # most places around a point
 
 
 @kernel
 def first_places(points: np.ndarray, boxes: SearchBoxes, places: np.ndarray, reach: float, owner: np.ndarray) -> None:
     """The first of the places (S, 3) within reach of each point (N, 3), -1 if there is none; boxes : of the places."""
-    found = np.empty(256, np.int64)
+    found = np.empty(MOST_PLACES_NEAR_POINT, np.int64)
     for p in range(len(points)):
         owner[p] = -1
         for f in range(search(boxes, places, points[p, 0], points[p, 1], points[p, 2], reach, found)):
@@ -77,7 +79,7 @@ def moved(pose: np.ndarray, p: Vector) -> Vector:
 
 
 @kernel
-def turned(pose: np.ndarray, v: Vector) -> Vector:
+def turned_by_motion(pose: np.ndarray, v: Vector) -> Vector:
     """Return the direction that a (4, 4) pose gives to v."""
     return (
         pose[0, 0] * v[0] + pose[0, 1] * v[1] + pose[0, 2] * v[2],
@@ -112,10 +114,10 @@ def _add(sums: np.ndarray, arm: Vector, d: Vector, n: Vector, m: Vector, sharp: 
         t = cross(arm, a)
         rest = dot(a, d)
         w = weight * stiffness
-        for i in range(MOTION + 1):
-            u = rest if i == MOTION else (t[i] if i < 3 else a[i - 3])
-            for j in range(MOTION + 1):
-                v = rest if j == MOTION else (t[j] if j < 3 else a[j - 3])
+        for i in range(MOTION_NUMBERS + 1):
+            u = rest if i == MOTION_NUMBERS else (t[i] if i < 3 else a[i - 3])
+            for j in range(MOTION_NUMBERS + 1):
+                v = rest if j == MOTION_NUMBERS else (t[j] if j < 3 else a[j - 3])
                 sums[i, j] += w * u * v
 
 
@@ -149,7 +151,7 @@ def step_sums(
         n = nearest(boxes, places, q[0], q[1], q[2], reach)
         if n < 0 or place_at_boundary[n]:
             continue
-        v = turned(back, row(normals, p))
+        v = turned_by_motion(back, row(normals, p))
         m = row(place_normals, n)
         v = (turn * v[0], turn * v[1], turn * v[2])
         if dot(v, m) < SLOPE_OF_PAIR:
@@ -158,7 +160,7 @@ def step_sums(
         across = dot(d, m) / soft
         weight = 1.0 / (1.0 + across * across)
         # the difference and the normals in the common frame: pose @ inverse(back) turns them
-        w = turned(pose, row(normals, p))
+        w = turned_by_motion(pose, row(normals, p))
         w = (turn * w[0], turn * w[1], turn * w[2])
         common = moved(pose, row(points, p))
         d = _into(pose, back, d)
@@ -171,7 +173,7 @@ def step_sums(
 @kernel
 def _into(pose: np.ndarray, back: np.ndarray, v: Vector) -> Vector:
     """Turn a direction from the frame of the places into the common one: by the inverse of `back`, then by `pose`."""
-    return turned(
+    return turned_by_motion(
         pose,
         (
             back[0, 0] * v[0] + back[1, 0] * v[1] + back[2, 0] * v[2],
@@ -182,7 +184,7 @@ def _into(pose: np.ndarray, back: np.ndarray, v: Vector) -> Vector:
 
 
 @kernel
-def judge(
+def judge_overlap(
     points: np.ndarray,
     normals: np.ndarray,
     places: np.ndarray,
@@ -212,7 +214,7 @@ def judge(
         off = dot(d, m)
         if dot(d, d) - off * off > OVER_PLACE * OVER_PLACE * spacing * spacing:
             continue  # beside the surface of the other scan, not over it
-        cosine = turn * dot(turned(back, row(normals, p)), m)
+        cosine = turn * dot(turned_by_motion(back, row(normals, p)), m)
         if cosine < OTHER_SIDE:
             continue
         if abs(off) <= near and cosine > SAME_SLOPE:

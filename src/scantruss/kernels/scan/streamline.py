@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...runtime.jit import kernel
+from ...runtime.jit import kernel, record_type
 from ..geometry.boxes import SearchBoxes, box_index, put_into, slot_of
 
 SIDE_BITS = 3  # bits of a coordinate that number the boxes along the side of a block
 BLOCK_SIDE = 1 << SIDE_BITS  # boxes along the side of a block
 SIDE_MASK = BLOCK_SIDE - 1  # takes these bits out of a coordinate
 BLOCK_BYTES = BLOCK_SIDE * BLOCK_SIDE  # a bit for each box of a block
-CHOSEN, BLOCKS = 0, 1  # places in `count`
+CHOSEN_COUNTS = record_type(points=np.int64, blocks=np.int64)  # points chosen so far, and blocks in which they lie
 
 
 @kernel
@@ -24,7 +24,7 @@ def choose_first(
     chosen: np.ndarray,
     begin: int,
     end: int,
-    count: np.ndarray,
+    counts: np.record,
 ) -> int:
     """Choose the first of the points `among` (M,), of those before `end` where M is 0, in each box that is not taken yet.
 
@@ -38,7 +38,7 @@ def choose_first(
     taken : (B, BLOCK_BYTES) uint8, zero at the start: a bit for each box of a block
     chosen : (capacity,) int64, filled with the points
     begin, end : where to go on and to stop in `among`
-    count : (2,) int64 the points and the blocks so far
+    counts : CHOSEN_COUNTS so far
 
     Returns
     -------
@@ -53,16 +53,16 @@ def choose_first(
         )
         block = blocks.first[slot_of(blocks, i >> SIDE_BITS, j >> SIDE_BITS, k >> SIDE_BITS)]
         if block < 0:
-            block = count[BLOCKS]
+            block = counts.blocks
             if block == len(taken):
                 return m
             put_into(blocks, block, i >> SIDE_BITS, j >> SIDE_BITS, k >> SIDE_BITS)
-            count[BLOCKS] += 1
+            counts.blocks += 1
         byte, bit = ((i & SIDE_MASK) << SIDE_BITS) + (j & SIDE_MASK), np.uint8(1 << (k & SIDE_MASK))
         if taken[block, byte] & bit == 0:
-            if count[CHOSEN] == len(chosen):
+            if counts.points == len(chosen):
                 return m
             taken[block, byte] |= bit
-            chosen[count[CHOSEN]] = p
-            count[CHOSEN] += 1
+            chosen[counts.points] = p
+            counts.points += 1
     return end

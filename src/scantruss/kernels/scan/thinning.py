@@ -12,13 +12,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...runtime.jit import kernel
+from ...runtime.jit import kernel, record_type
 
-STEPS = 4294967296.0  # along the side of a box; 2**31 points fit into a box
+STEPS_OF_BOX = 4294967296.0  # along the side of a box; 2**31 points fit into a box
 FARTHEST_BOX = 4503599627370496.0  # boxes from the zero of the frame; beyond, a box is finer than float64
 COUNT, SUMS = 3, 4  # columns of a row, behind the three numbers of the box
 LARGEST_INT64 = 9223372036854775807  # int64
-ROWS, NOT_FINITE, TOO_FAR = 0, 1, 2  # counters
+BOX_COUNTS = record_type(rows=np.int64, not_finite=np.int64, too_far=np.int64)  # rows in use; points left out
 BOUNDARY_BOXES = 2  # boxes to every side that show whether a box is at the boundary
 BLEND_RADIUS = 2.0  # radius about its mean within which the means of others count [box]
 BOUNDARY_SHIFT = 0.25  # distance of their centre from its own mean above which a box is at the boundary [box]
@@ -30,7 +30,7 @@ class BoxTable(NamedTuple):
     slots: np.ndarray  #: (H,) int64 row of the box in each slot, -1 free; H is a power of two, at least 1.5 C
     rows: np.ndarray  #: (C, 7) int64 box i, j, k; points in it; sums of their x, y, z from its lower corner [step]
     extremes: np.ndarray  #: (C, 18) float64 points farthest to -x, +x, -y, +y, -z, +z; (0, 18) where not wanted
-    counters: np.ndarray  #: (3,) int64 rows in use, points that are not finite, points too far from zero
+    counts: np.record  #: BOX_COUNTS
 
 
 @kernel
@@ -73,8 +73,8 @@ def take_extremes(table: BoxTable, row: int, points: np.ndarray, n: int, fresh: 
 @kernel
 def new_row(table: BoxTable, slot: int, i: int, j: int, k: int) -> int:
     """Begin a row for a box."""
-    row = table.counters[ROWS]
-    table.counters[ROWS] += 1
+    row = table.counts.rows
+    table.counts.rows += 1
     table.slots[slot] = row
     table.rows[row, 0], table.rows[row, 1], table.rows[row, 2] = i, j, k
     for c in range(COUNT, SUMS + 3):
@@ -85,7 +85,7 @@ def new_row(table: BoxTable, slot: int, i: int, j: int, k: int) -> int:
 @kernel
 def step_in_box(t: float, i: int) -> int:
     """Place t along a side [box] as steps from the lower corner of box i."""
-    return min(int((t - i) * STEPS + 0.5), 4294967295)
+    return min(int((t - i) * STEPS_OF_BOX + 0.5), 4294967295)
 
 
 @kernel
@@ -95,8 +95,10 @@ def add_points(table: BoxTable, points: np.ndarray, begin: int, size: float) -> 
     for n in range(begin, len(points)):
         x, y, z = points[n, 0] / size, points[n, 1] / size, points[n, 2] / size
         if not (abs(x) < FARTHEST_BOX and abs(y) < FARTHEST_BOX and abs(z) < FARTHEST_BOX):
-            finite = math.isfinite(points[n, 0]) and math.isfinite(points[n, 1]) and math.isfinite(points[n, 2])
-            table.counters[TOO_FAR if finite else NOT_FINITE] += 1
+            if math.isfinite(points[n, 0]) and math.isfinite(points[n, 1]) and math.isfinite(points[n, 2]):
+                table.counts.too_far += 1
+            else:
+                table.counts.not_finite += 1
             continue
         i, j, k = int(math.floor(x)), int(math.floor(y)), int(math.floor(z))
         fresh = False
@@ -104,7 +106,7 @@ def add_points(table: BoxTable, points: np.ndarray, begin: int, size: float) -> 
             slot = slot_of_box(table.slots, table.rows, i, j, k)
             row = table.slots[slot]
             if row < 0:
-                if table.counters[ROWS] == len(table.rows):
+                if table.counts.rows == len(table.rows):
                     return n
                 row = new_row(table, slot, i, j, k)
                 fresh = True
@@ -127,7 +129,7 @@ def add_rows(table: BoxTable, rows: np.ndarray, extremes: np.ndarray, begin: int
         row = table.slots[slot]
         fresh = row < 0
         if fresh:
-            if table.counters[ROWS] == len(table.rows):
+            if table.counts.rows == len(table.rows):
                 return n
             row = new_row(table, slot, int(rows[n, 0]), int(rows[n, 1]), int(rows[n, 2]))
         for c in range(COUNT, SUMS + 3):
@@ -152,7 +154,7 @@ def middles(rows: np.ndarray, size: float, means: np.ndarray) -> None:
     """Mean of the points of each row, into (C, 3) [scan unit]."""
     for row in range(len(rows)):
         for c in range(3):
-            means[row, c] = (rows[row, c] + rows[row, SUMS + c] / (STEPS * rows[row, COUNT])) * size
+            means[row, c] = (rows[row, c] + rows[row, SUMS + c] / (STEPS_OF_BOX * rows[row, COUNT])) * size
 
 
 @kernel

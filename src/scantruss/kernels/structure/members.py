@@ -9,7 +9,7 @@ import numpy as np
 from ...runtime.jit import kernel
 from ..geometry.vectors import Vector, cross, dot, put_vector, row
 
-NATURAL = 6  # deformations of a member: lengthening, twist, both ends about y, both ends about z
+NATURAL_DEFORMATIONS = 6  # deformations of a member: lengthening, twist, both ends about y, both ends about z
 MEMBER_WAYS = 9  # by which it deforms: the chord, the turns of both ends
 
 
@@ -35,14 +35,18 @@ def beam_forces(
     moves : (V, 3); turns : (V, 3, 3); strain : (M,) that needs no force
     """
     least = 1.0
-    deformed, answers, shares = np.empty(NATURAL), np.empty(NATURAL), np.empty(NATURAL)
-    slopes = np.zeros((NATURAL, 3, 3))  # of each deformation by the chord and the turns of both ends
+    deformed, answers, shares = (
+        np.empty(NATURAL_DEFORMATIONS),
+        np.empty(NATURAL_DEFORMATIONS),
+        np.empty(NATURAL_DEFORMATIONS),
+    )
+    slopes = np.zeros((NATURAL_DEFORMATIONS, 3, 3))  # of each deformation by the chord and the turns of both ends
     frames, ratios = np.empty((2, 3, 3)), np.empty((2, 3))
     for m in range(len(ends)):
         chord = _deform(ends[m], row(chords, m), axes[m], series, moves, turns, frames, ratios, deformed, slopes)
         least = min(least, chord.cosine)
         _answer(bending[m], bow[m], axial[m], chord.first, strain[m], deformed, shares, answers)
-        for k in range(NATURAL):
+        for k in range(NATURAL_DEFORMATIONS):
             natural[m, k] = answers[k]
         _gather(slopes, answers, forces[m])
     return least
@@ -78,24 +82,28 @@ def beam_tangents(
     tangents : (M, 12, 12) of the forces by displacements and turns of both ends; none if they are not wanted
     """
     least = 1.0
-    deformed, answers, shares = np.empty(NATURAL), np.empty(NATURAL), np.empty(NATURAL)
-    slopes = np.zeros((NATURAL, 3, 3))
+    deformed, answers, shares = (
+        np.empty(NATURAL_DEFORMATIONS),
+        np.empty(NATURAL_DEFORMATIONS),
+        np.empty(NATURAL_DEFORMATIONS),
+    )
+    slopes = np.zeros((NATURAL_DEFORMATIONS, 3, 3))
     frames, ratios, by_ways = np.empty((2, 3, 3)), np.empty((2, 3)), np.empty((MEMBER_WAYS, MEMBER_WAYS))
     for m in range(len(ends)):
         chord = _deform(ends[m], row(chords, m), axes[m], series, moves, turns, frames, ratios, deformed, slopes)
         least = min(least, chord.cosine)
         _answer(bending[m], bow[m], axial[m], chord.first, factor * strain[m], deformed, shares, answers)
-        for k in range(NATURAL):
+        for k in range(NATURAL_DEFORMATIONS):
             natural[m, k] = answers[k]
             for way in range(MEMBER_WAYS):
                 slope[m, k, way] = slopes[k, way // 3, way % 3]
         _gather(slopes, answers, forces[m])
-        for k in range(NATURAL):
+        for k in range(NATURAL_DEFORMATIONS):
             answers[k] = -axial[m] * chord.first * strain[m] * shares[k]
         _gather(slopes, answers, strained[m])
         known = foreseen[m] if len(foreseen) else natural[m]
-        for i in range(NATURAL):
-            for k in range(NATURAL):
+        for i in range(NATURAL_DEFORMATIONS):
+            for k in range(NATURAL_DEFORMATIONS):
                 stiffness[m, i, k] = bending[m, i, k] + known[0] * chord.first * bow[m, i, k]
                 stiffness[m, i, k] += axial[m] * chord.first * shares[i] * shares[k]
         if len(tangents):
@@ -139,7 +147,7 @@ def _deform(
     along = chord[0] / length, chord[1] / length, chord[2] / length
     both = before[0] + chord[0], before[1] + chord[1], before[2] + chord[2]
     deformed[0] = dot(change, both) / (length + first)
-    put_vector(slopes[0, 0], 0, along)
+    put_vector(slopes[0, 0], along)
     least = 1.0
     for end in range(2):
         _turn(axes, turns[ends[end]], frames[end])
@@ -217,15 +225,15 @@ def _answer(
 ) -> None:
     """Fill the natural forces: those of bending, and the axial force times the share of each deformation in the strain."""
     bowed = 0.0
-    for i in range(NATURAL):
+    for i in range(NATURAL_DEFORMATIONS):
         shares[i] = answers[i] = 0.0
-        for k in range(NATURAL):
+        for k in range(NATURAL_DEFORMATIONS):
             shares[i] += bow[i, k] * deformed[k]
             answers[i] += bending[i, k] * deformed[k]
         bowed += shares[i] * deformed[i] / 2
     shares[0] = 1.0 / length
     force = axial * (deformed[0] / length + bowed - strain)
-    for i in range(NATURAL):
+    for i in range(NATURAL_DEFORMATIONS):
         answers[i] += force * length * shares[i]
 
 
@@ -234,7 +242,7 @@ def _gather(slopes: np.ndarray, answers: np.ndarray, forces: np.ndarray) -> None
     """Fill the forces and moments at both ends (12,) of natural forces."""
     for c in range(3):
         chord, start, end = 0.0, 0.0, 0.0
-        for k in range(NATURAL):
+        for k in range(NATURAL_DEFORMATIONS):
             chord += slopes[k, 0, c] * answers[k]
             start += slopes[k, 1, c] * answers[k]
             end += slopes[k, 2, c] * answers[k]
@@ -247,10 +255,10 @@ def _add_stiffness(stiffness: np.ndarray, slope: np.ndarray, by_ways: np.ndarray
     for a in range(MEMBER_WAYS):
         for b in range(a + 1):
             by_ways[a, b] = 0.0
-    for i in range(NATURAL):
+    for i in range(NATURAL_DEFORMATIONS):
         for b in range(MEMBER_WAYS):
             half = 0.0
-            for k in range(NATURAL):
+            for k in range(NATURAL_DEFORMATIONS):
                 half += stiffness[i, k] * slope[k, b]
             for a in range(b, MEMBER_WAYS):
                 by_ways[a, b] += slope[i, a] * half

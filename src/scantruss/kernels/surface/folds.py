@@ -10,35 +10,30 @@ from __future__ import annotations
 import numpy as np
 
 from ...runtime.jit import kernel
-from ..geometry.quadric import coefficients_from, height_at, slopes_at
-from ..geometry.vectors import Vector, along, cross, dot, norm, put_vector, row, subtract, vector_from, vector_in
-from .local_surface import CENTRE, HEIGHTS, NEAREST_SAMPLE, NORMAL, TANGENT, Surface, flood
+from ..geometry.quadric import coefficients_of, height_at, slopes_at
+from ..geometry.vectors import Vector, along, cross, dot, norm, put_vector, row, subtract, vector_of
+from .local_surface import Surface, flood
 
-SQUARES = 20  # first of six columns of a patch: the quadric of its planes, xx xy xz yy yz zz
-LINEAR = 26  # first of three columns: the linear part of that quadric
-CONSTANT = 29  # column of its constant
-FOLD_WEIGHT = 30  # column of the weight: 0 where the surface is smooth, 1 on a sharp fold
-DESIRED_LENGTH = 19  # column of the desired member length
 PLANES_REACH = 0.75  # samples farther from the node do not count [member lengths]
 # 1 - |mean normal|^2 at folds of 23 and 31 degrees; the term begins at one, is whole at the other
-SMOOTH, SHARP = 0.04, 0.07
+SMOOTH_SPREAD, SHARP_SPREAD = 0.04, 0.07
 FAR_ENERGY = 0.5  # energy of a place far off the planes
-STRENGTH = 15.0  # energy of a place one member length off the planes
-CLING = 0.03  # of a node to the rounded surface when it goes to the crest of a fold
-CHORD = 12.0  # energy of the middle of a member that lies one length off the surface
-SAG = 0.06  # distance of that middle from a surface that bends gently [member lengths]
+PLANES_WEIGHT = 15.0  # energy of a place one member length off the planes
+CLING_WEIGHT = 0.03  # of a node to the rounded surface when it goes to the crest of a fold
+CHORD_WEIGHT = 12.0  # energy of the middle of a member that lies one length off the surface
+GENTLE_SAG = 0.06  # distance of that middle from a surface that bends gently [member lengths]
 LONGEST_WAY_TO_CREST = 0.25  # way to a crest, at most [member lengths]
 FACING_AWAY = -0.3  # samples that face farther away than this are another side's
 
 
 @kernel
-def add_fold(surface: Surface, patch: np.ndarray, members: float, strength: float) -> None:
+def add_fold(surface: Surface, patch: np.record, members: float, strength: float) -> None:
     """Fill in the quadric of a patch from the samples within some member lengths of its middle; strength 1 is usual."""
-    place = vector_from(patch, CENTRE)
-    sample = int(patch[NEAREST_SAMPLE])
+    place = vector_of(patch.centre)
+    sample = patch.sample
     facing = row(surface.normals, sample)
     local = surface.length * surface.field[sample]
-    patch[FOLD_WEIGHT], patch[DESIRED_LENGTH] = 0.0, local
+    patch.fold_weight, patch.desired = 0.0, local
     if strength == 0.0:
         return
     reach = members * local
@@ -62,31 +57,31 @@ def add_fold(surface: Surface, patch: np.ndarray, members: float, strength: floa
     if total <= 0.0:
         return
     spread = 1.0 - (mx * mx + my * my + mz * mz) / (total * total)
-    share = (spread - SMOOTH) / (SHARP - SMOOTH)
+    share = (spread - SMOOTH_SPREAD) / (SHARP_SPREAD - SMOOTH_SPREAD)
     if share <= 0.0:
         return
-    put_vector(patch, SQUARES, (xx / total, xy / total, xz / total))
-    put_vector(patch, SQUARES + 3, (yy / total, yz / total, zz / total))
-    put_vector(patch, LINEAR, (bx / total, by / total, bz / total))
-    patch[CONSTANT] = c / total
-    patch[FOLD_WEIGHT] = strength * min(share, 1.0)
+    put_vector(patch.fold_squares[:3], (xx / total, xy / total, xz / total))
+    put_vector(patch.fold_squares[3:], (yy / total, yz / total, zz / total))
+    put_vector(patch.fold_linear, (bx / total, by / total, bz / total))
+    patch.fold_constant = c / total
+    patch.fold_weight = strength * min(share, 1.0)
 
 
 @kernel
-def onto_crest(surface: Surface, patch: np.ndarray, place: Vector) -> Vector:
+def onto_crest(surface: Surface, patch: np.record, place: Vector) -> Vector:
     """Place on the crest of a fold or in its corner near a place on the rounded surface; the same place where there is no fold.
 
-    The least of the quadric with CLING times the squared distance moved; the way is at most LONGEST_WAY_TO_CREST.
+    The least of the quadric with CLING_WEIGHT times the squared distance moved; the way is at most LONGEST_WAY_TO_CREST.
     """
-    local = surface.length * surface.field[int(patch[NEAREST_SAMPLE])]
-    x, y, z = subtract(place, vector_from(patch, CENTRE))
-    share = patch[FOLD_WEIGHT]
+    local = surface.length * surface.field[patch.sample]
+    x, y, z = subtract(place, vector_of(patch.centre))
+    share = patch.fold_weight
     if share <= 0.0:
         return place
-    xx, xy, xz, yy, yz, zz = coefficients_from(patch, SQUARES)
-    bx, by, bz = vector_from(patch, LINEAR)
+    xx, xy, xz, yy, yz, zz = coefficients_of(patch.fold_squares)
+    bx, by, bz = vector_of(patch.fold_linear)
     p, q, r = bx - (xx * x + xy * y + xz * z), by - (xy * x + yy * y + yz * z), bz - (xz * x + yz * y + zz * z)
-    a, b, c, d, e, f = xx + CLING, xy, xz, yy + CLING, yz, zz + CLING
+    a, b, c, d, e, f = xx + CLING_WEIGHT, xy, xz, yy + CLING_WEIGHT, yz, zz + CLING_WEIGHT
     first, second, third = d * f - e * e, c * e - b * f, b * e - c * d  # row of the adjugate
     det = a * first + b * second + c * third
     step = (
@@ -103,32 +98,32 @@ def onto_crest(surface: Surface, patch: np.ndarray, place: Vector) -> Vector:
 @kernel
 def fold_energy(patches: np.ndarray, v: int, x: float, y: float, z: float) -> float:
     """Energy of a place off the planes around node v, at most FAR_ENERGY; nothing where the surface is smooth."""
-    if patches[v, FOLD_WEIGHT] == 0.0:
+    if patches[v].fold_weight == 0.0:
         return 0.0
-    k = STRENGTH * patches[v, FOLD_WEIGHT] / patches[v, DESIRED_LENGTH] ** 2
-    x, y, z = subtract((x, y, z), vector_in(patches, v, CENTRE))
-    xx, xy, xz, yy, yz, zz = coefficients_from(patches[v], SQUARES)
-    bx, by, bz = vector_in(patches, v, LINEAR)
+    k = PLANES_WEIGHT * patches[v].fold_weight / patches[v].desired ** 2
+    x, y, z = subtract((x, y, z), vector_of(patches[v].centre))
+    xx, xy, xz, yy, yz, zz = coefficients_of(patches[v].fold_squares)
+    bx, by, bz = vector_of(patches[v].fold_linear)
     gx, gy, gz = (
         xx * x + xy * y + xz * z - 2.0 * bx,
         xy * x + yy * y + yz * z - 2.0 * by,
         xz * x + yz * y + zz * z - 2.0 * bz,
     )
-    q = k * (gx * x + gy * y + gz * z + patches[v, CONSTANT])
+    q = k * (gx * x + gy * y + gz * z + patches[v].fold_constant)
     return q * FAR_ENERGY / (q + FAR_ENERGY) if q > 0.0 else 0.0
 
 
 @kernel
 def fold_slope(patches: np.ndarray, v: int, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Gradient of `fold_energy`."""
-    if patches[v, FOLD_WEIGHT] == 0.0:
+    if patches[v].fold_weight == 0.0:
         return 0.0, 0.0, 0.0
-    k = 2.0 * STRENGTH * patches[v, FOLD_WEIGHT] / patches[v, DESIRED_LENGTH] ** 2
+    k = 2.0 * PLANES_WEIGHT * patches[v].fold_weight / patches[v].desired ** 2
     f = 1.0 - fold_energy(patches, v, x, y, z) / FAR_ENERGY
     k *= f * f
-    x, y, z = subtract((x, y, z), vector_in(patches, v, CENTRE))
-    xx, xy, xz, yy, yz, zz = coefficients_from(patches[v], SQUARES)
-    bx, by, bz = vector_in(patches, v, LINEAR)
+    x, y, z = subtract((x, y, z), vector_of(patches[v].centre))
+    xx, xy, xz, yy, yz, zz = coefficients_of(patches[v].fold_squares)
+    bx, by, bz = vector_of(patches[v].fold_linear)
     return (
         k * (xx * x + xy * y + xz * z - bx),
         k * (xy * x + yy * y + yz * z - by),
@@ -139,15 +134,15 @@ def fold_slope(patches: np.ndarray, v: int, x: float, y: float, z: float) -> tup
 @kernel
 def chord_energy(patches: np.ndarray, v: int, w: int, x: float, y: float, z: float) -> float:
     """Energy of the middle of a member between nodes v and w: what it is off the surface beyond the sag of a gentle bend."""
-    if patches[v, FOLD_WEIGHT] == 0.0 and patches[w, FOLD_WEIGHT] == 0.0:
+    if patches[v].fold_weight == 0.0 and patches[w].fold_weight == 0.0:
         return 0.0
     first, second = _height(patches, v, x, y, z)[0], _height(patches, w, x, y, z)[0]
     q = (
-        CHORD
-        * max(patches[v, FOLD_WEIGHT], patches[w, FOLD_WEIGHT])
+        CHORD_WEIGHT
+        * max(patches[v].fold_weight, patches[w].fold_weight)
         * (
-            0.5 * (first * first + second * second) / max(patches[v, DESIRED_LENGTH], patches[w, DESIRED_LENGTH]) ** 2
-            - SAG * SAG
+            0.5 * (first * first + second * second) / max(patches[v].desired, patches[w].desired) ** 2
+            - GENTLE_SAG * GENTLE_SAG
         )
     )
     return q * FAR_ENERGY / (q + FAR_ENERGY) if q > 0.0 else 0.0
@@ -163,9 +158,9 @@ def chord_slope(patches: np.ndarray, v: int, w: int, x: float, y: float, z: floa
     k = (
         f
         * f
-        * CHORD
-        * max(patches[v, FOLD_WEIGHT], patches[w, FOLD_WEIGHT])
-        / max(patches[v, DESIRED_LENGTH], patches[w, DESIRED_LENGTH]) ** 2
+        * CHORD_WEIGHT
+        * max(patches[v].fold_weight, patches[w].fold_weight)
+        / max(patches[v].desired, patches[w].desired) ** 2
     )
     h, px, py, pz = _height(patches, v, x, y, z)
     g, qx, qy, qz = _height(patches, w, x, y, z)
@@ -175,9 +170,9 @@ def chord_slope(patches: np.ndarray, v: int, w: int, x: float, y: float, z: floa
 @kernel
 def _height(patches: np.ndarray, v: int, x: float, y: float, z: float) -> tuple[float, float, float, float]:
     """Height of a place over the patch of node v, and its gradient."""
-    d = subtract((x, y, z), vector_in(patches, v, CENTRE))
-    normal, along_u = vector_in(patches, v, NORMAL), vector_in(patches, v, TANGENT)
-    along_v, heights = cross(normal, along_u), coefficients_from(patches[v], HEIGHTS)
+    d = subtract((x, y, z), vector_of(patches[v].centre))
+    normal, along_u = vector_of(patches[v].normal), vector_of(patches[v].tangent)
+    along_v, heights = cross(normal, along_u), coefficients_of(patches[v].heights)
     a, b = dot(d, along_u), dot(d, along_v)
     h = dot(d, normal) - height_at(heights, a, b)
     s, t = slopes_at(heights, a, b)

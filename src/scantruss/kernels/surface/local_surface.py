@@ -1,7 +1,6 @@
 """The local surface of the scan: moving least squares on the points of one sheet.
 
-Nodes are kept on it while they move. Each node keeps the patch that was fitted last, a quadric over a plane, as a row of `patches`
-whose columns are named below: one row is copied and fitted as a whole, and `folds` adds columns of its own from 19 on.
+Nodes are kept on it while they move. Each node keeps the patch that was fitted last, a record of `patches`.
 """
 
 from __future__ import annotations
@@ -11,14 +10,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...runtime.jit import kernel
+from ...runtime.jit import kernel, record_type
 from ..geometry.quadric import (
-    COLUMNS,
-    RESIDUAL,
+    FIT_POINT,
     TERMS_OF_PLANE,
     TERMS_OF_QUADRIC,
-    WEIGHT,
-    coefficients_from,
+    coefficients_of,
     fit_heights,
     height_at,
     project,
@@ -36,18 +33,30 @@ from ..geometry.vectors import (
     row,
     smallest_eigenvector,
     subtract,
-    vector_from,
+    vector_of,
 )
 
-PATCH_COLUMNS = 31  # columns of a patch
-CENTRE = 0  # first of three columns: where the patch was fitted [scan unit]
-NORMAL = 3  # first of three columns: oriented unit normal of its plane
-TANGENT = 6  # first of three columns: unit vector u in the plane; v = normal x u
-HEIGHTS = 9  # first of six columns: height over the plane as coefficients of 1 u v u^2 uv v^2
-NEAREST_SAMPLE = 15  # column of the sample nearest to the centre
-IS_FITTED = 16  # column that is 1 once the patch is fitted, 0 before
-MEAN_DISTANCE = 17  # column of the mean distance of the points from the patch [scan unit]
-ROUNDNESS = 18  # column of how the points spread in the plane: 1 in a disc, 0 on a line
+SURFACE_PATCH = record_type(  # a quadric over a plane, and what `kernels.surface.folds` knows of a fold there
+    centre=(np.float64, 3),  # where it was fitted [scan unit]
+    normal=(np.float64, 3),  # oriented unit normal of its plane
+    tangent=(np.float64, 3),  # unit vector u in the plane; v = normal x u
+    heights=(np.float64, 6),  # over the plane as coefficients of 1 u v u^2 uv v^2
+    sample=np.int64,  # nearest to the centre
+    is_fitted=np.bool_,
+    mean_distance=np.float64,  # of the points from the patch [scan unit]
+    roundness=np.float64,  # how the points spread in the plane: 1 in a disc, 0 on a line
+    desired=np.float64,  # member length [scan unit]
+    fold_squares=(np.float64, 6),  # quadric of the squared distance from the planes around: xx xy xz yy yz zz,
+    fold_linear=(np.float64, 3),  # its linear part
+    fold_constant=np.float64,  # and its constant
+    fold_weight=np.float64,  # 0 where the surface is smooth, 1 on a sharp fold
+)
+# how a patch is fitted: it widens until so many points are within it, or it is so wide
+ENOUGH_POINTS = 12
+PATCH_WIDENS = 1.26  # from one radius to the next
+WIDEST_LOCAL_PATCH = 1.6  # in usual patches; at least a member
+FEWEST_IN_QUADRIC_PATCH, FEWEST_IN_PLANE_PATCH = 10, 4
+OFF_FIT = 0.002  # mean distance of more points than enough from a patch above which it is fitted again [member lengths]
 
 
 class Surface(NamedTuple):
@@ -174,15 +183,15 @@ def gather_points(
                 d = subtract(row(surface.points, p), place)
                 w = 1.0 - dot(d, d) / (radius * radius)
                 if w > 0.0 and taken < len(buffer):
-                    buffer[taken, 0], buffer[taken, 1], buffer[taken, 2] = d
-                    buffer[taken, WEIGHT] = w * w
+                    put_vector(buffer[taken].place, d)
+                    buffer[taken].weight = w * w
                     taken += 1
     return taken
 
 
 @kernel
-def fit_patch(surface: Surface, patch: np.ndarray, sample: int, place: Vector) -> int:
-    """Fit a patch (PATCH_COLUMNS,) to the points around a place, on the sheet of `sample`; returns how many points it was fitted to.
+def fit_patch(surface: Surface, patch: np.record, sample: int, place: Vector) -> int:
+    """Fit a patch to the points around a place, on the sheet of `sample`; returns how many points it was fitted to.
 
     Points weigh (1 - d^2 / R^2)^2. Where they lie off the fit (plants, noise), it is fitted again with those far off weighing less.
     """
@@ -190,35 +199,37 @@ def fit_patch(surface: Surface, patch: np.ndarray, sample: int, place: Vector) -
     facing = row(surface.normals, sample)
     local = surface.field[
         sample
-    ]  # a patch grows with the members; the wider it is, the fewer points of a sample are enough
+    ]  # a patch grows with the members: the wider it is, the fewer points of a sample are enough
     radius, most = surface.patch_radius * local, max(int(surface.patch_points / (local * local)), 1)
-    patch[NEAREST_SAMPLE] = sample
-    taken, widest = 0, max(1.6 * surface.patch_radius, surface.length) * local
+    patch.sample = sample
+    taken, widest = 0, max(WIDEST_LOCAL_PATCH * surface.patch_radius, surface.length) * local
     while True:  # the radius grows by a quarter until it is the widest
         count = flood(surface, sample, place, radius + 0.5 * surface.step)
         if count < 1:
             count = 1
-        buffer = np.empty((_points_at_most(surface, count, most), COLUMNS))
+        buffer = np.empty(_points_at_most(surface, count, most), FIT_POINT)
         taken = gather_points(surface, count, place, radius, most, facing, 0.0, buffer)
-        if taken >= 12 or not 0.0 < radius < widest:
+        if taken >= ENOUGH_POINTS or not 0.0 < radius < widest:
             break
-        radius *= 1.26
+        radius *= PATCH_WIDENS
     _plane_of(buffer, taken, facing, patch)
-    project(buffer, taken, radius, vector_from(patch, NORMAL), vector_from(patch, TANGENT))
-    matrix, heights = np.empty((6, 7)), patch[HEIGHTS : HEIGHTS + TERMS_OF_QUADRIC]
-    size = TERMS_OF_QUADRIC if taken >= 10 else (TERMS_OF_PLANE if taken >= 4 else 1)
-    size = fit_heights(buffer, taken, radius, size, heights, matrix)
+    project(buffer, taken, radius, vector_of(patch.normal), vector_of(patch.tangent))
+    matrix = np.empty((TERMS_OF_QUADRIC, TERMS_OF_QUADRIC + 1))
+    size = 1
+    if taken >= FEWEST_IN_PLANE_PATCH:
+        size = TERMS_OF_QUADRIC if taken >= FEWEST_IN_QUADRIC_PATCH else TERMS_OF_PLANE
+    size = fit_heights(buffer, taken, radius, size, patch.heights, matrix)
     mean = 0.0
     for i in range(taken):
-        mean += abs(buffer[i, RESIDUAL])
+        mean += abs(buffer[i].residual)
     mean = mean / max(taken, 1)
-    if mean > 0.002 * surface.length * local and taken > 12:
+    if mean > OFF_FIT * surface.length * local and taken > ENOUGH_POINTS:
         for i in range(taken):
-            r = buffer[i, RESIDUAL] / (2.0 * mean)
-            buffer[i, WEIGHT] /= (1.0 + r * r) * (1.0 + r * r)
-        fit_heights(buffer, taken, radius, size, heights, matrix)
-    put_vector(patch, CENTRE, place)
-    patch[IS_FITTED], patch[MEAN_DISTANCE] = 1.0, mean
+            r = buffer[i].residual / (2.0 * mean)
+            buffer[i].weight /= (1.0 + r * r) * (1.0 + r * r)
+        fit_heights(buffer, taken, radius, size, patch.heights, matrix)
+    put_vector(patch.centre, place)
+    patch.is_fitted, patch.mean_distance = True, mean
     return taken
 
 
@@ -233,31 +244,31 @@ def _points_at_most(surface: Surface, count: int, most: int) -> int:
 
 
 @kernel
-def _plane_of(buffer: np.ndarray, taken: int, facing: Vector, patch: np.ndarray) -> None:
+def _plane_of(buffer: np.ndarray, taken: int, facing: Vector, patch: np.record) -> None:
     """Fit the plane of a patch by weighted least squares, its normal on the side of `facing`; `facing` itself where points are few."""
     normal = facing
-    patch[ROUNDNESS] = 0.0
-    if taken >= 4:
+    patch.roundness = 0.0
+    if taken >= FEWEST_IN_PLANE_PATCH:
         xx, xy, xz, yy, yz, zz = second_moments(buffer, taken)
         normal = smallest_eigenvector(xx, xy, xz, yy, yz, zz)
         trace = xx + yy + zz
         if trace > 0.0:
             minors = xx * yy + xx * zz + yy * zz - xy * xy - xz * xz - yz * yz
-            patch[ROUNDNESS] = 4.0 * minors / (trace * trace)
+            patch.roundness = 4.0 * minors / (trace * trace)
         side = dot(normal, facing)
         if side < 0.0:
             normal = (-normal[0], -normal[1], -normal[2])
         if abs(side) < 0.5:
             normal = facing
-    put_vector(patch, NORMAL, normal)
-    put_vector(patch, TANGENT, across(normal))
+    put_vector(patch.normal, normal)
+    put_vector(patch.tangent, across(normal))
 
 
 @kernel
-def onto_patch(patch: np.ndarray, place: Vector) -> Vector:
+def onto_patch(patch: np.record, place: Vector) -> Vector:
     """Foot of a place on a patch, nearly at right angles to it."""
-    centre, normal, u = vector_from(patch, CENTRE), vector_from(patch, NORMAL), vector_from(patch, TANGENT)
-    heights, v = coefficients_from(patch, HEIGHTS), cross(normal, u)
+    centre, normal, u = vector_of(patch.centre), vector_of(patch.normal), vector_of(patch.tangent)
+    heights, v = coefficients_of(patch.heights), cross(normal, u)
     d = subtract(place, centre)
     x, y, h = dot(d, u), dot(d, v), dot(d, normal)
     a, b = x, y
@@ -271,18 +282,18 @@ def onto_patch(patch: np.ndarray, place: Vector) -> Vector:
 
 @kernel
 def feet_on_patches(patches: np.ndarray, places: np.ndarray, feet: np.ndarray) -> None:
-    """Fill the feet (N, 3) of places (N, 3), each on its own patch (N, columns)."""
+    """Fill the feet (N, 3) of places (N, 3), each on its own patch (N,)."""
     for k in range(len(places)):
         feet[k, 0], feet[k, 1], feet[k, 2] = onto_patch(patches[k], row(places, k))
 
 
 @kernel
-def patch_normal(patch: np.ndarray, place: Vector) -> Vector:
+def patch_normal(patch: np.record, place: Vector) -> Vector:
     """Unit normal of a patch over a place."""
-    normal, u = vector_from(patch, NORMAL), vector_from(patch, TANGENT)
+    normal, u = vector_of(patch.normal), vector_of(patch.tangent)
     v = cross(normal, u)
-    d = subtract(place, vector_from(patch, CENTRE))
-    slope_a, slope_b = slopes_at(coefficients_from(patch, HEIGHTS), dot(d, u), dot(d, v))
+    d = subtract(place, vector_of(patch.centre))
+    slope_a, slope_b = slopes_at(coefficients_of(patch.heights), dot(d, u), dot(d, v))
     n = along(along(normal, -slope_a, u), -slope_b, v)
     length = norm(n)
     return n[0] / length, n[1] / length, n[2] / length

@@ -9,16 +9,14 @@ import numpy as np
 from ...runtime.jit import kernel
 from ..geometry.boxes import SearchBoxes, search
 from ..geometry.quadric import (
-    COLUMNS,
-    RESIDUAL,
+    FIT_POINT,
     TERMS_OF_PLANE,
     TERMS_OF_QUADRIC,
-    WEIGHT,
     fit_heights,
     project,
     second_moments,
 )
-from ..geometry.vectors import Vector, across, along, dot, norm, row, smallest_eigenvector, subtract
+from ..geometry.vectors import Vector, across, along, dot, norm, put_vector, row, smallest_eigenvector, subtract
 
 POINTS_OF_FIT = 4096  # more than fill a ball of 8 spacings
 FIT_TURNS = 4  # fits, each with the weights that follow from the one before
@@ -49,7 +47,7 @@ def move_to_mean(
     """
     found, buffer, weights = (
         np.empty(POINTS_OF_FIT, np.int64),
-        np.empty((POINTS_OF_FIT, COLUMNS)),
+        np.empty(POINTS_OF_FIT, FIT_POINT),
         np.empty(POINTS_OF_FIT),
     )
     heights, matrix = np.zeros(TERMS_OF_QUADRIC), np.empty((TERMS_OF_QUADRIC, TERMS_OF_QUADRIC + 1))
@@ -59,8 +57,8 @@ def move_to_mean(
         for i in range(taken):
             d = subtract(row(points, found[i]), place)
             w = 1.0 - dot(d, d) / (radius * radius)
-            buffer[i, 0], buffer[i, 1], buffer[i, 2] = d
-            buffer[i, WEIGHT] = weights[i] = w * w
+            put_vector(buffer[i].place, d)
+            buffer[i].weight = weights[i] = w * w
         normal = (0.0, 0.0, 1.0)
         for turn in range(FIT_TURNS):
             if turn < KNOWN_TURNS:
@@ -78,8 +76,9 @@ def _terms(buffer: np.ndarray, taken: int, radius: float, normal: Vector) -> int
     """How many terms of a quadric the points determine well: those of a plane where they lie to one side of the middle."""
     total = x = y = z = 0.0
     for i in range(taken):
-        w = buffer[i, WEIGHT]
-        total, x, y, z = total + w, x + w * buffer[i, 0], y + w * buffer[i, 1], z + w * buffer[i, 2]
+        w = buffer[i].weight
+        d = buffer[i].place
+        total, x, y, z = total + w, x + w * d[0], y + w * d[1], z + w * d[2]
     total = max(total, 1e-300)
     centre = (x / total, y / total, z / total)
     aside = norm(along(centre, -dot(centre, normal), normal))
@@ -93,11 +92,11 @@ def _weigh_again(buffer: np.ndarray, taken: int, weights: np.ndarray) -> None:
     """Give points less weight the farther they lie off the fit."""
     off = total = 0.0
     for i in range(taken):
-        off, total = off + weights[i] * abs(buffer[i, RESIDUAL]), total + weights[i]
+        off, total = off + weights[i] * abs(buffer[i].residual), total + weights[i]
     off = max(OFF_THE_FIT * off / max(total, 1e-300), 1e-300)
     for i in range(taken):
-        r = buffer[i, RESIDUAL] / off
-        buffer[i, WEIGHT] = weights[i] / (1.0 + r * r)
+        r = buffer[i].residual / off
+        buffer[i].weight = weights[i] / (1.0 + r * r)
 
 
 @kernel
@@ -117,16 +116,16 @@ def mean_offsets(
     It is the quadric over the tangent plane of the node fitted to the points within its radius (V,) by least squares: no point
     weighs less for being far off. NaN where they do not determine a plane.
     """
-    buffer, found = np.empty((POINTS_OF_FIT, COLUMNS)), np.empty(POINTS_OF_FIT, np.int64)
+    buffer, found = np.empty(POINTS_OF_FIT, FIT_POINT), np.empty(POINTS_OF_FIT, np.int64)
     heights, matrix = np.zeros(TERMS_OF_QUADRIC), np.empty((TERMS_OF_QUADRIC, TERMS_OF_QUADRIC + 1))
     for v in range(begin, end):
         place, normal = row(nodes, v), row(normals, v)
         taken = search(boxes, points, place[0], place[1], place[2], radius[v], found)
         for i in range(taken):
             d = subtract(row(points, found[i]), place)
-            buffer[i, 0], buffer[i, 1], buffer[i, 2] = d
+            put_vector(buffer[i].place, d)
             w = 1.0 - dot(d, d) / (radius[v] * radius[v])
-            buffer[i, WEIGHT] = w * w
+            buffer[i].weight = w * w
         size = _terms(buffer, taken, radius[v], normal)
         bias[v] = scatter[v] = math.nan
         if size == 1:
@@ -135,6 +134,6 @@ def mean_offsets(
         fit_heights(buffer, taken, radius[v], size, heights, matrix)
         off = total = 0.0
         for i in range(taken):
-            off += buffer[i, WEIGHT] * buffer[i, RESIDUAL] * buffer[i, RESIDUAL]
-            total += buffer[i, WEIGHT]
+            off += buffer[i].weight * buffer[i].residual * buffer[i].residual
+            total += buffer[i].weight
         bias[v], scatter[v] = heights[0], math.sqrt(off / max(total, 1e-300))

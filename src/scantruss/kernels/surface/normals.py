@@ -17,6 +17,10 @@ NARROWEST, WIDEST = 0.1, 1.0  # tangent of half the angle between both sides, at
 SCATTER = 0.5  # rms distance of the samples from both sides, at most, in their mean distance from the plane between
 FEWEST_BEHIND = 6  # fewest samples that show the two sides
 MOST_AROUND_EDGE = 1024  # most samples that are looked at around an edge
+EACH_SIDE = 0.2  # share of the samples that must lie on each side of an edge
+NO_LINK, WORST_LINK = 255, 254.0  # what stands for no link, and for one whose normals disagree most
+# cosine of normals that face opposite ways; sine of the way between samples side by side
+OPPOSITE_WAYS, SIDE_BY_SIDE = -0.9, 0.3
 
 
 @kernel
@@ -82,7 +86,7 @@ def trust_thin_samples(
 
 
 @kernel
-def face_off_edges(
+def face_off_edges_of(
     mean: np.ndarray, normals: np.ndarray, boxes: SearchBoxes, thick: np.ndarray, reach: float, begin: int, end: int
 ) -> None:
     """Let samples on a sharp edge of a body face away from it: some of `thick` (P,), from `begin` to `end` - 1.
@@ -127,7 +131,7 @@ def face_off_edges(
                 n, above = n + 1, above + (h > 0.0)
                 h = abs(h)
                 st, sh, stt, sth, shh = st + t, sh + h, stt + t * t, sth + t * h, shh + h * h
-        if n < FEWEST_BEHIND or not 0.2 * n < above < 0.8 * n:
+        if n < FEWEST_BEHIND or not EACH_SIDE * n < above < (1.0 - EACH_SIDE) * n:
             continue
         spread = stt - st * st / n
         slope = (sth - st * sh / n) / spread if spread > 0.0 else 0.0
@@ -143,7 +147,7 @@ def across_to(d: Vector, way: Vector) -> Vector:
 
 
 @kernel
-def cut_steep_links(
+def cut_steep_links_of(
     mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, steep: float, begin: int, end: int
 ) -> None:
     """Drop neighbours that lie above or below a sample from `begin` to `end` - 1, not beside it: they are on another sheet."""
@@ -202,9 +206,9 @@ def link_weights(
     for s in range(begin, end):
         for k in range(neighbors.shape[1]):
             n = neighbors[s, k]
-            weights[s, k] = 255
+            weights[s, k] = NO_LINK
             if n >= 0:
-                weights[s, k] = int(254.0 * math.sqrt(max(1.0 - _mirrored(mean, normals, s, n), 0.0)))
+                weights[s, k] = int(WORST_LINK * math.sqrt(max(1.0 - _mirrored(mean, normals, s, n), 0.0)))
 
 
 @kernel
@@ -286,10 +290,14 @@ def head_on_links(
     for s in range(len(mean)):
         for k in range(neighbors.shape[1]):
             n = neighbors[s, k]
-            if n < 0 or dot(row(normals, s), row(normals, n)) >= -0.9 or max(thickness[s], thickness[n]) >= smooth:
+            if (
+                n < 0
+                or dot(row(normals, s), row(normals, n)) >= OPPOSITE_WAYS
+                or max(thickness[s], thickness[n]) >= smooth
+            ):
                 continue
             d = subtract(row(mean, n), row(mean, s))
             rise = max(abs(dot(d, row(normals, s))), abs(dot(d, row(normals, n))))
-            if rise < 0.3 * math.sqrt(max(dot(d, d), 1e-300)):
+            if rise < SIDE_BY_SIDE * math.sqrt(max(dot(d, d), 1e-300)):
                 count += 1
     return count

@@ -16,6 +16,9 @@ from ...runtime.jit import kernel
 from ..geometry.vectors import Vector, across, along, cross, dot, norm, row, subtract, unit
 
 SINE_OF_60 = 0.5 * math.sqrt(3.0)  # sine of 60 degrees, the height of a regular triangle [sides]
+# added to the squared sine between two planes, so that the point between parallel ones is half way
+PARALLEL_PLANES = 1e-4
+SEEN_AROUND = 1.2  # way over the links within which nodes are compared, beyond their least distance [member lengths]
 
 
 class Level(NamedTuple):
@@ -214,7 +217,7 @@ def nearest_node(node: Vector, direction: Vector, normal: Vector, place: Vector,
 def between(p: Vector, n: Vector, q: Vector, m: Vector) -> Vector:
     """A point between two samples, on the line where their planes meet (half way where they are parallel)."""
     np_, nq, mp, mq, nm = dot(n, p), dot(n, q), dot(m, p), dot(m, q), dot(n, m)
-    share = 1.0 / (1.0 - nm * nm + 1e-4)
+    share = 1.0 / (1.0 - nm * nm + PARALLEL_PLANES)
     s = 2.0 * (nq - np_ - nm * (mp - mq)) * share
     t = 2.0 * (mp - mq - nm * (nq - np_)) * share
     return (
@@ -339,7 +342,7 @@ def list_nodes(level: Level, order: np.ndarray, length: float, apart: float, cho
     is_chosen, seen_from = np.zeros(len(chosen), np.bool_), np.full(len(chosen), -1, np.int64)
     queue = np.empty(len(chosen), np.int64)
     count = 0
-    reach = 1.2 * length + apart
+    reach = SEEN_AROUND * length + apart
     for o in range(len(order)):
         p = order[o]
         place = row(level.node, p)

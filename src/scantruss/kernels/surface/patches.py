@@ -10,25 +10,22 @@ import numpy as np
 from ...runtime.jit import kernel
 from ..geometry.kd_tree import KDTree, within
 from ..geometry.quadric import (
-    PLANE_A,
-    PLANE_B,
-    RESIDUAL,
-    SQUARE,
+    REGULARIZATION,
     TERMS_OF_PLANE,
     TERMS_OF_QUADRIC,
-    WEIGHT,
-    coefficients_from,
+    coefficients_of,
     fit_heights,
     height_at,
     normal_equations,
     project,
     second_moments,
     slopes_at,
-    solve,
+    solve_normal_equations,
 )
-from ..geometry.vectors import Vector, across, along, cross, dot, row, smallest_eigenvector, subtract, unit
+from ..geometry.vectors import Vector, across, along, cross, dot, put_vector, row, smallest_eigenvector, subtract, unit
 
 POINTS_FOR_QUADRIC, POINTS_FOR_PLANE = 10, 5  # fewest points that either is fitted to
+LEAST_FREEDOMS = 0.25  # share of the points that the coefficients of a patch leave free at least
 
 
 class Patches(NamedTuple):
@@ -52,7 +49,7 @@ def empty_patches(count: int) -> Patches:
 
 
 @kernel
-def gather(
+def gather_around(
     tree: KDTree, place: Vector, radius: float, leave: int, stack: np.ndarray, found: np.ndarray, buffer: np.ndarray
 ) -> int:
     """Put the points within a radius of a place into the buffer of a fit, except the one `leave`; returns how many.
@@ -64,8 +61,8 @@ def gather(
     for i in range(count):
         if found[i] != leave:
             d = subtract(row(tree.points, found[i]), place)
-            buffer[taken, 0], buffer[taken, 1], buffer[taken, 2] = d
-            buffer[taken, SQUARE] = dot(d, d)
+            put_vector(buffer[taken].place, d)
+            buffer[taken].square = dot(d, d)
             taken += 1
     return taken
 
@@ -88,8 +85,8 @@ def fit(
     """
     inside = 0
     for p in range(taken):
-        w = max(1.0 - buffer[p, SQUARE] / (radius * radius), 0.0)
-        buffer[p, WEIGHT] = w * w
+        w = max(1.0 - buffer[p].square / (radius * radius), 0.0)
+        buffer[p].weight = w * w
         inside += w > 0.0
     patches.points[i], patches.radius[i] = inside, radius
     size = terms_for(inside)
@@ -107,15 +104,15 @@ def _weigh_again(buffer: np.ndarray, taken: int, radius: float) -> None:
     """Weigh points less, the more mean residuals they lie off the patch."""
     total = mean = 0.0
     for i in range(taken):
-        w = max(1.0 - buffer[i, SQUARE] / (radius * radius), 0.0)
-        total, mean = total + w * w, mean + w * w * abs(buffer[i, RESIDUAL])
+        w = max(1.0 - buffer[i].square / (radius * radius), 0.0)
+        total, mean = total + w * w, mean + w * w * abs(buffer[i].residual)
     if mean <= 1e-12 * radius * total:
         return
     for i in range(taken):
-        w = max(1.0 - buffer[i, SQUARE] / (radius * radius), 0.0)
-        r = buffer[i, RESIDUAL] * total / (2.0 * mean)
+        w = max(1.0 - buffer[i].square / (radius * radius), 0.0)
+        r = buffer[i].residual * total / (2.0 * mean)
         r = w / (1.0 + r * r)
-        buffer[i, WEIGHT] = r * r
+        buffer[i].weight = r * r
 
 
 @kernel
@@ -133,13 +130,13 @@ def _rms(buffer: np.ndarray, taken: int, size: int) -> float:
     """Rms distance of the points from a patch, corrected for the `size` coefficients fitted to them; inf without points."""
     total = squares = weights = 0.0
     for i in range(taken):
-        w = buffer[i, WEIGHT]
+        w = buffer[i].weight
         total, weights = total + w, weights + w * w
-        squares = squares + w * buffer[i, RESIDUAL] * buffer[i, RESIDUAL]
+        squares = squares + w * buffer[i].residual * buffer[i].residual
     if total <= 0.0:
         return math.inf
     many = total * total / weights
-    return math.sqrt(squares / total * many / max(many - size, 0.25 * many))
+    return math.sqrt(squares / total * many / max(many - size, LEAST_FREEDOMS * many))
 
 
 @kernel
@@ -148,25 +145,25 @@ def height_variance(buffer: np.ndarray, taken: int, size: int, matrix: np.ndarra
     normal_equations(buffer, taken, matrix)
     for r in range(size):
         matrix[r, size] = 1.0 if r == 0 else 0.0
-        matrix[r, r] += 1e-9 * matrix[0, 0]
-    if not solve(matrix, size):
+        matrix[r, r] += REGULARIZATION * matrix[0, 0]
+    if not solve_normal_equations(matrix, size):
         return math.inf
     variance = 0.0
     for i in range(taken):
-        a, b = buffer[i, PLANE_A], buffer[i, PLANE_B]
+        a, b = buffer[i].a, buffer[i].b
         share = matrix[0, size]
         if size >= TERMS_OF_PLANE:
             share += a * matrix[1, size] + b * matrix[2, size]
         if size >= TERMS_OF_QUADRIC:
             share += a * a * matrix[3, size] + a * b * matrix[4, size] + b * b * matrix[5, size]
-        variance += (buffer[i, WEIGHT] * share) ** 2
+        variance += (buffer[i].weight * share) ** 2
     return variance
 
 
 @kernel
 def foot(patches: Patches, i: int, place: Vector) -> tuple[Vector, Vector]:
     """Foot of a place on patch i, nearly at right angles to it, and the normal there; both places relative to that of the patch."""
-    normal, u, heights = row(patches.normal, i), row(patches.tangent, i), coefficients_from(patches.heights[i], 0)
+    normal, u, heights = row(patches.normal, i), row(patches.tangent, i), coefficients_of(patches.heights[i])
     v = cross(normal, u)
     a, b, h = dot(place, u), dot(place, v), dot(place, normal)
     slope_a = slope_b = 0.0

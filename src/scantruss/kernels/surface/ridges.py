@@ -14,31 +14,41 @@ import math
 
 import numpy as np
 
-from ...runtime.jit import kernel
-from ..geometry.quadric import WEIGHT, solve
-from ..geometry.vectors import Vector, along, cross, dot, norm, row, subtract, unit
+from ...runtime.jit import kernel, record_type
+from ..geometry.quadric import REGULARIZATION, solve_normal_equations
+from ..geometry.vectors import Vector, along, cross, dot, norm, put_vector, row, subtract, unit, vector_of
 from .local_surface import Surface, flood, gather_points, walk
-from .turned_folds import TABLE_COLUMNS, smooth_part, turned_fold_error
+from .turned_folds import QuadricFreePoints, smooth_part, turned_fold_error
 
 EITHER_SIDE = -2.0  # no cosine is so low: the points of both sides of a ridge count
 TERMS = 8  # terms of the folded surface: k0 to k7
 SLOPE_OF_SIDE, BEND_OF_SIDE, TERMS_OF_SIDE = 1, 2, 4  # of a side: 1, s, s^2 and t, with s the distance from the crest
-# what `fit_fold` writes: place (0:3) and direction (3:6), angle by which the fold turns within a member [radian], gain over a smooth
-# surface (F statistic), rms distance of the points [scan unit]
-BEND, GAIN, OFF, FOUND = 6, 7, 8, 9
-ROUNDINGS = (0.0, 0.12, 0.25, 0.4)  # w of the folds that are tried [member lengths]
-CLEARLY = 0.9  # share of the error of a sharper fold below which one that is more rounded is taken
+FOLD = record_type(
+    place=(np.float64, 3),  # on the crest [scan unit]
+    ahead=(np.float64, 3),  # unit vector along the crest
+    bend=np.float64,  # angle by which the fold turns within a member [radian]
+    gain=np.float64,  # over a smooth surface (F statistic)
+    off=np.float64,  # rms distance of the points [scan unit]
+)
+ROUNDINGS_TRIED = (0.0, 0.12, 0.25, 0.4)  # w of the folds that are tried [member lengths]
+CLEARLY_BETTER = 0.9  # share of the error of a sharper fold below which one that is more rounded is taken
 FIRST_ROUNDING = 0.12  # w while the line is looked for [member lengths]
-SHIFTS, TURNS = 5, 5  # lines tried across and around in each round
+SHIFTS_TRIED, TURNS_TRIED = 5, 5  # lines tried across and around in each round
+# how far the outermost of them lie from the middle one in the first round [radius, radian], and by how much they close up with each
+FIRST_SHIFT, FIRST_TURN, NARROWED = 0.4, 0.35, 0.4
 # rounds in which the line is looked for with the first rounding; all, then sharp and as it is rounded
-SEARCHES, FOLD_FITS = 2, 5
-NEAR = 0.375  # points nearer to the line than this are left out where its sides are measured: a fold may be rounded [radius]
-MIDDLE_OF_SIDES = 0.5 * (1.0 + NEAR)  # of the points that are taken [radius]
+ROUNDED_FITS, FOLD_FITS = 2, 5
+NEAR_THE_LINE = 0.375  # points nearer to the line than this are left out where its sides are measured: a fold may be rounded [radius]
+MIDDLE_OF_SIDES = 0.5 * (1.0 + NEAR_THE_LINE)  # of the points that are taken [radius]
 # how far from the line the sides of a rounded fold may meet, at least and at most [radius]
 LEAST_MEETING, FARTHEST_MEETING = 0.2, 0.4
 SHARP_ENOUGH = 0.7  # angle of a fold from which the place where its sides meet is certain enough [radian]
 FEWEST_OF_FLANK = 6  # fewest points of a side
 POINTS_OF_FIRST_LOOK = 2  # points of a sample that are looked at first
+FEWEST_OF_FIRST_LOOK, FEWEST_OF_FOLD = 20, 30  # fewest points in a first look, in a fit
+SHIFT_OF_FIRST_LOOK = 0.25  # lines that are tried in a first look lie so far to both sides of the middle [radius]
+STEPS_TO_DIRECTION = 8  # steps of the power method, by far enough for a direction that matters
+LARGEST_GAIN = 1e9  # where the points lie exactly on the fold
 
 
 @kernel
@@ -71,7 +81,7 @@ def mean_normal(surface: Surface, sample: int, place: Vector, radius: float) -> 
         m = along(m, -dot(m, n), n)
         if norm(m) > best:
             best, c = norm(m), m
-    for _ in range(8):
+    for _ in range(STEPS_TO_DIRECTION):
         total = (0.0, 0.0, 0.0)
         for i in range(count):
             m = row(surface.normals, surface.queue[i])
@@ -104,13 +114,13 @@ def fold_error(
     matrix[:, :] = 0.0
     squares = 0.0
     for i in range(taken):
-        d = (buffer[i, 0], buffer[i, 1], buffer[i, 2])
+        d = vector_of(buffer[i].place)
         u, t, h = dot(d, c) / radius - shift, dot(d, e) / radius, dot(d, n) / radius
         size = math.sqrt(u * u + rounding * rounding)
         term[0], term[1], term[2], term[3], term[4], term[5] = 1.0, t, t * t, u, u * u, u * t
         term[6], term[7] = (size, u * size) if folded else (u * u * u, 0.0)
         term[TERMS] = h
-        w = buffer[i, WEIGHT]
+        w = buffer[i].weight
         squares += w * h * h
         for r in range(TERMS):
             wr = w * term[r]
@@ -120,9 +130,9 @@ def fold_error(
     for r in range(TERMS):
         for k in range(r):
             matrix[r, k] = matrix[k, r]
-        matrix[r, r] += 1e-9 * matrix[0, 0]
+        matrix[r, r] += REGULARIZATION * matrix[0, 0]
         right[r] = matrix[r, TERMS]
-    if not solve(matrix, TERMS):
+    if not solve_normal_equations(matrix, TERMS):
         return np.inf
     for r in range(TERMS):
         squares -= right[r] * matrix[r, TERMS]
@@ -149,30 +159,34 @@ def flank(
 
     Its direction and how much it bends [radian]; how far across and how high its middle is [radius].
 
-    crest : place of the line across and its height [radius]. Taken are the points between NEAR and 1 radius from it.
+    crest : place of the line across and its height [radius]. Taken are the points between NEAR_THE_LINE and 1 radius from it.
     """
     c, e, n = frame
     term = np.empty(TERMS_OF_SIDE)
     across, up = np.zeros((TERMS_OF_SIDE, TERMS_OF_SIDE + 1)), np.zeros((TERMS_OF_SIDE, TERMS_OF_SIDE + 1))
     points = 0
     for i in range(taken):
-        d = (buffer[i, 0], buffer[i, 1], buffer[i, 2])
+        d = vector_of(buffer[i].place)
         u, h = side * (dot(d, c) / radius - crest[0]), dot(d, n) / radius - crest[1]
         s = math.sqrt(u * u + h * h)
-        if u > 0.0 and NEAR < s < 1.0:
+        if u > 0.0 and NEAR_THE_LINE < s < 1.0:
             points += 1
             s -= MIDDLE_OF_SIDES
             term[0], term[1], term[2], term[3] = 1.0, s, s * s, dot(d, e) / radius
             for r in range(TERMS_OF_SIDE):
                 for k in range(TERMS_OF_SIDE):
-                    across[r, k] += buffer[i, WEIGHT] * term[r] * term[k]
-                across[r, TERMS_OF_SIDE] += buffer[i, WEIGHT] * term[r] * u
-                up[r, TERMS_OF_SIDE] += buffer[i, WEIGHT] * term[r] * h
+                    across[r, k] += buffer[i].weight * term[r] * term[k]
+                across[r, TERMS_OF_SIDE] += buffer[i].weight * term[r] * u
+                up[r, TERMS_OF_SIDE] += buffer[i].weight * term[r] * h
     for r in range(TERMS_OF_SIDE):
-        across[r, r] += 1e-9 * across[0, 0]
+        across[r, r] += REGULARIZATION * across[0, 0]
         for k in range(TERMS_OF_SIDE):
             up[r, k] = across[r, k]
-    if points < FEWEST_OF_FLANK or not solve(across, TERMS_OF_SIDE) or not solve(up, TERMS_OF_SIDE):
+    if (
+        points < FEWEST_OF_FLANK
+        or not solve_normal_equations(across, TERMS_OF_SIDE)
+        or not solve_normal_equations(up, TERMS_OF_SIDE)
+    ):
         return 0.0, 0.0, 0.0, 0.0, False
     half = 1.0 - MIDDLE_OF_SIDES
     slope_across, bend_across = across[SLOPE_OF_SIDE, TERMS_OF_SIDE], across[BEND_OF_SIDE, TERMS_OF_SIDE]
@@ -210,14 +224,14 @@ def is_folded(surface: Surface, sample: int, radius: float, least: float, buffer
     n, c = mean_normal(surface, sample, place, radius)
     count = flood(surface, sample, place, radius + 0.5 * surface.step)
     taken = gather_points(surface, count, place, radius, POINTS_OF_FIRST_LOOK, n, EITHER_SIDE, buffer)
-    if taken < 20 or norm(c) < 0.5:
+    if taken < FEWEST_OF_FIRST_LOOK or norm(c) < 0.5:
         return False
     matrix = np.empty((TERMS, TERMS + 1))
     frame = turned_frame(c, n, 0.0)
     error, bend = np.inf, 0.0
     rounding, reach = FIRST_ROUNDING * surface.length / radius, 0.5 * surface.length / radius
     for j in range(3):
-        found = fold_error(buffer, taken, frame, 0.25 * (j - 1), radius, True, rounding, matrix)
+        found = fold_error(buffer, taken, frame, SHIFT_OF_FIRST_LOOK * (j - 1), radius, True, rounding, matrix)
         if found < error:
             error, bend = found, jump_of(matrix, rounding, reach)
     return bend >= least
@@ -247,24 +261,26 @@ def keep_folded(
 
 
 @kernel
-def best_rounding(table: np.ndarray, squares: float, angle: float, shift: float, member: float) -> tuple[float, float]:
+def best_rounding(
+    points: QuadricFreePoints, squares: float, angle: float, shift: float, member: float
+) -> tuple[float, float]:
     """Error of the folds along a line of the sharpest rounding that fits, and that rounding [radius]; member : its length [radius]."""
     least, best = np.inf, 0.0
-    for w in ROUNDINGS:
-        error = turned_fold_error(table, squares, angle, shift, w * member)
-        if error < CLEARLY * least:
+    for w in ROUNDINGS_TRIED:
+        error = turned_fold_error(points, squares, angle, shift, w * member)
+        if error < CLEARLY_BETTER * least:
             least, best = error, w * member
     return least, best
 
 
 @kernel
 def fit_fold(
-    surface: Surface, sample: int, place: Vector, towards: Vector, radius: float, buffer: np.ndarray, found: np.ndarray
+    surface: Surface, sample: int, place: Vector, towards: Vector, radius: float, buffer: np.ndarray, fold: np.record
 ) -> bool:
     """Fit a folded surface around a place; False where there are too few points.
 
     towards : direction of the ridge near by, (0, 0, 0) where it is not known
-    found : (FOUND,), filled
+    fold : FOLD, filled
     """
     sample = walk(surface, sample, place)
     n, c = mean_normal(surface, sample, place, radius)
@@ -272,31 +288,30 @@ def fit_fold(
         c = unit(cross(towards, n))
     count = flood(surface, sample, place, radius + 0.5 * surface.step)
     taken = gather_points(surface, count, place, radius, int(surface.patch_points), n, EITHER_SIDE, buffer)
-    if taken < 30 or norm(c) < 0.5:
+    if taken < FEWEST_OF_FOLD or norm(c) < 0.5:
         return False
     matrix = np.empty((TERMS, TERMS + 1))
-    table = np.empty((taken, TABLE_COLUMNS))
-    squares = smooth_part(buffer, turned_frame(c, n, 0.0), radius, table)
+    points, squares = smooth_part(buffer, taken, turned_frame(c, n, 0.0), radius)
     angle = shift = 0.0
-    reach, swing = 0.4, 0.35
+    reach, swing = FIRST_SHIFT, FIRST_TURN
     least = np.inf
     rounding = FIRST_ROUNDING * surface.length / radius
     for turn in range(FOLD_FITS):
-        if turn == SEARCHES and least < np.inf:
+        if turn == ROUNDED_FITS and least < np.inf:
             rounding = 0.0
-            least = turned_fold_error(table, squares, angle, shift, rounding)
+            least = turned_fold_error(points, squares, angle, shift, rounding)
         if turn == FOLD_FITS - 1 and least < np.inf:
-            least, rounding = best_rounding(table, squares, angle, shift, surface.length / radius)
+            least, rounding = best_rounding(points, squares, angle, shift, surface.length / radius)
         at_angle, at_shift = angle, shift
-        for i in range(TURNS):
-            for j in range(SHIFTS):
-                a = at_angle + swing * (2.0 * i / (TURNS - 1) - 1.0)
-                b = at_shift + reach * (2.0 * j / (SHIFTS - 1) - 1.0)
-                error = turned_fold_error(table, squares, a, b, rounding)
+        for i in range(TURNS_TRIED):
+            for j in range(SHIFTS_TRIED):
+                a = at_angle + swing * (2.0 * i / (TURNS_TRIED - 1) - 1.0)
+                b = at_shift + reach * (2.0 * j / (SHIFTS_TRIED - 1) - 1.0)
+                error = turned_fold_error(points, squares, a, b, rounding)
                 if error < least:
                     least, angle, shift = error, a, b
-        if turn != SEARCHES:  # a sharp fold may lie a little beside
-            reach, swing = 0.4 * reach, 0.4 * swing
+        if turn != ROUNDED_FITS:  # a sharp fold may lie a little beside
+            reach, swing = NARROWED * reach, NARROWED * swing
     if least == np.inf:
         return False
     frame = turned_frame(c, n, angle)
@@ -304,21 +319,20 @@ def fit_fold(
     least = fold_error(buffer, taken, frame, shift, radius, True, rounding, matrix)
     total = 0.0
     for i in range(taken):
-        total += buffer[i, WEIGHT]
+        total += buffer[i].weight
     across, ahead, _ = frame
     crest = matrix[0, TERMS] + matrix[6, TERMS] * rounding
-    found[BEND], meet = bend_of(buffer, taken, frame, (shift, crest), radius)
+    fold.bend, meet = bend_of(buffer, taken, frame, (shift, crest), radius)
     aside = rounding > 0.0 or abs(meet) > LEAST_MEETING  # then the line is not yet the crest
-    if aside and abs(meet) < FARTHEST_MEETING and found[BEND] > SHARP_ENOUGH:
+    if aside and abs(meet) < FARTHEST_MEETING and fold.bend > SHARP_ENOUGH:
         size = math.sqrt(meet * meet + rounding * rounding)
         crest = matrix[0, TERMS] + meet * (matrix[3, TERMS] + meet * matrix[4, TERMS])
         crest += size * (matrix[6, TERMS] + meet * matrix[7, TERMS])
         shift += meet
-    at = along(along(place, shift * radius, across), crest * radius, n)
-    found[0], found[1], found[2] = at
-    found[3], found[4], found[5] = unit(along(ahead, matrix[1, TERMS], n))
-    found[GAIN] = min((smooth - least) * taken / max(least, 1e-12), 1e9)
-    found[OFF] = radius * math.sqrt(least / max(total, 1e-300))
+    put_vector(fold.place, along(along(place, shift * radius, across), crest * radius, n))
+    put_vector(fold.ahead, unit(along(ahead, matrix[1, TERMS], n)))
+    fold.gain = min((smooth - least) * taken / max(least, 1e-12), LARGEST_GAIN)
+    fold.off = radius * math.sqrt(least / max(total, 1e-300))
     return True
 
 

@@ -17,13 +17,19 @@ TIE_TOLERANCE = 1e-6  # relative difference below which two squared distances co
 SIDE_OF_GROOVE = 0.3  # cosine of the normals of two samples below which they may be the sides of a groove
 LOOKS_ACROSS = 0.2  # cosine between a normal and the way to the other side above which a sample looks at it; share of it that is deeper
 ONE_SIDE = 0.3  # cosine of the normals of two samples on one side of a groove
-OPPOSITE = -0.7  # cosine of the normals given with two points below which they lie on opposite sides of something thin
+# cosine of the normals given with two points below which they lie on opposite sides of something thin
+OPPOSITE_COSINE = -0.7
+MOST_SAMPLES_AROUND = 4096  # most samples around a sample
+SAMPLE_REACH_GROWS = 1.5  # by which the search for neighbours widens
+ENOUGH_NEIGHBORS = 6  # neighbours with which a part of the scan is not sparse
+MUCH_FARTHER = 2.25  # ratio of squared distances from which on one sample is much farther than another
+OFF_SETTLED = 1.5  # distance from the plane of the samples around, in mean ones, at which one weighs half
 
 
 @kernel
 def may_share_sheet(facing: np.ndarray, p: int, q: int) -> bool:
     """Whether two points do not face opposite ways; facing (N, 3) normals given with the points, (0, 3) where none are."""
-    return len(facing) == 0 or dot(row(facing, p), row(facing, q)) > OPPOSITE
+    return len(facing) == 0 or dot(row(facing, p), row(facing, q)) > OPPOSITE_COSINE
 
 
 @kernel
@@ -202,14 +208,15 @@ def nearest_samples(
     face opposite ways are no neighbours; facing (S, 3) normals given with the scan, (0, 3) where none are.
     """
     k = neighbors.shape[1]
-    found = np.empty(4096, np.int64)
+    found = np.empty(MOST_SAMPLES_AROUND, np.int64)
     distance = np.empty(k)
     for s in range(begin, end):
         x, y, z = row(positions, s)
         reach = near
         count = _alike(search(boxes, positions, x, y, z, reach, found), found, facing, s)
-        while (count < k + 1 and reach < far) or (count < 7 and reach < 2.0 * far):  # the reach, never 0, grows by half
-            reach = min(1.5 * reach, far if reach < far else 2.0 * far)
+        most = max(k, ENOUGH_NEIGHBORS)
+        while count <= most and reach < (far if count > ENOUGH_NEIGHBORS else 2.0 * far):  # the reach, never 0, grows
+            reach = min(SAMPLE_REACH_GROWS * reach, far if reach < far else 2.0 * far)
             count = _alike(search(boxes, positions, x, y, z, reach, found), found, facing, s)
         held = 0
         for c in range(count):
@@ -288,13 +295,13 @@ def link_back(positions: np.ndarray, neighbors: np.ndarray) -> None:
     k_most = neighbors.shape[1]
     taken = np.zeros(len(positions), np.int64)
     for t in range(len(positions)):
-        for k in range(6):
+        for k in range(ENOUGH_NEIGHBORS):
             s = neighbors[t, k]
             if s < 0 or neighbors[s, k_most - 1] < 0 or taken[s] >= 3:
                 continue
             d = subtract(row(positions, t), row(positions, s))
-            e = subtract(row(positions, neighbors[s, 5]), row(positions, s))
-            if dot(d, d) < 2.25 * dot(e, e):
+            e = subtract(row(positions, neighbors[s, ENOUGH_NEIGHBORS - 1]), row(positions, s))
+            if dot(d, d) < MUCH_FARTHER * dot(e, e):
                 continue
             known = False
             for i in range(k_most):
@@ -364,7 +371,7 @@ def settle_samples(
                 for i in range(found):
                     d = subtract(row(mean, queue[i]), place)
                     w = 1.0 - dot(d, d) / (radius * radius)
-                    r = (dot(d, v) - off) / (1.5 * spread)
+                    r = (dot(d, v) - off) / (OFF_SETTLED * spread)
                     weight[i] = w * w / (1.0 + r * r)
         for c in range(3):
             settled[s, c] = place[c] + off * v[c]

@@ -8,9 +8,9 @@ import numpy as np
 
 from ...runtime.jit import kernel
 from ..geometry.boxes import SearchBoxes, put, search
-from ..geometry.quadric import coefficients_from
+from ..geometry.quadric import coefficients_of
 from ..geometry.vectors import Vector, dot, norm, row, subtract
-from .local_surface import HEIGHTS, MEAN_DISTANCE, PATCH_COLUMNS, Surface, fit_patch, flood, walk
+from .local_surface import SURFACE_PATCH, Surface, fit_patch, flood, walk
 
 BLEND_REACH = 2.2  # distance up to which the lengths of samples count at a place [steps between samples]
 CURVATURE_DEVIATION = 14.4  # standard deviation of a curvature inside the scan [that of a point / R^2 sqrt(points)]
@@ -18,6 +18,8 @@ DEVIATION_ASIDE = 14.0  # its relative growth with the squared distance of the m
 RMS_OVER_MEAN = 1.25  # standard deviation of a normal distribution in its mean absolute deviation
 BLENDED_LENGTHS = 12  # given lengths that count at a place; the next nearest shows how far away a length counts
 SEARCH_GROWTHS = 90  # times that a search radius grows by half at most: from any box to all of them
+REACH_SHRINKS, BLEND_REACH_GROWS = 0.7, 1.5  # a search begins with this share of the last reach, and grows by this
+FEWEST_FOR_CURVATURE = 10  # fewest points of a patch whose curvature counts
 
 
 @kernel
@@ -98,12 +100,12 @@ def blend_lengths(
     wanted = min(BLENDED_LENGTHS + 1, len(given))
     for s in range(len(places)):
         place = row(places, s)
-        reach *= 0.7
+        reach *= REACH_SHRINKS
         count = search(boxes, given, place[0], place[1], place[2], reach, found)
         for _ in range(SEARCH_GROWTHS):
             if count >= wanted:
                 break
-            reach *= 1.5
+            reach *= BLEND_REACH_GROWS
             count = search(boxes, given, place[0], place[1], place[2], reach, found)
         kept = 0
         for i in range(count):
@@ -127,9 +129,9 @@ def blend_lengths(
 
 
 @kernel
-def _largest_curvature(patch: np.ndarray) -> float:
+def _largest_curvature(patch: np.record) -> float:
     """Absolute value of the larger principal curvature of a patch at its centre [1 / scan unit]."""
-    _, p, q, uu, uv, vv = coefficients_from(patch, HEIGHTS)
+    _, p, q, uu, uv, vv = coefficients_of(patch.heights)
     grown = 1.0 + p * p + q * q
     root = math.sqrt(grown)
     e, f, g = 1.0 + p * p, p * q, 1.0 + q * q
@@ -164,18 +166,18 @@ def measure_curvatures(
     curvatures, deviations : (P,), filled with its absolute value and with the standard deviation that noise gives it: that of the least
     squares fit, which grows where the scan lies to one side only [1 / scan unit]
     """
-    patch = np.zeros(PATCH_COLUMNS)
+    patch = np.zeros(1, SURFACE_PATCH)
     for i in range(begin, end):
         place = row(surface.mean, samples[i])
-        taken = fit_patch(surface, patch, samples[i], place)
+        taken = fit_patch(surface, patch[0], samples[i], place)
         count = flood(surface, samples[i], place, surface.patch_radius)
         x = y = z = 0.0
         for k in range(count):
             d = subtract(row(surface.mean, surface.queue[k]), place)
             x, y, z = x + d[0], y + d[1], z + d[2]
         aside = norm((x, y, z)) / (max(count, 1) * surface.patch_radius)
-        curvatures[i] = _largest_curvature(patch)
-        spread = CURVATURE_DEVIATION * (1.0 + DEVIATION_ASIDE * aside * aside) * RMS_OVER_MEAN * patch[MEAN_DISTANCE]
+        curvatures[i] = _largest_curvature(patch[0])
+        spread = CURVATURE_DEVIATION * (1.0 + DEVIATION_ASIDE * aside * aside) * RMS_OVER_MEAN * patch[0].mean_distance
         deviations[i] = spread / (surface.patch_radius * surface.patch_radius * math.sqrt(max(taken, 1)))
-        if taken < 10:
+        if taken < FEWEST_FOR_CURVATURE:
             deviations[i] = np.inf

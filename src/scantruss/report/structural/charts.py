@@ -5,26 +5,28 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from ...export.drawing.strokes import INK
+from ...export.drawing.strokes import INK_COLOUR
 from ...structure.path import Path
 from ...structure.path_report import draw_path, moves_label
 from ...structure.sizing import SizingRound
 from .parts import Frame
 
-SECOND = "#c1662b"  #: colour of the second axis
+SECOND_COLOUR = "#c1662b"  #: colour of the second axis
 
 
 def draw_rounds(figure: Any, place: Frame, rounds: Sequence[SizingRound]) -> None:
     """Draw mass and greatest utilization over the rounds of sizing."""
     axes = chart_axes(figure, place, "round", "mass [t]")
     numbers = range(1, len(rounds) + 1)
-    axes.plot(numbers, [each.mass / 1e3 for each in rounds], "o-", color=tuple(INK), markersize=4, linewidth=1.4)
+    axes.plot(numbers, [each.mass / 1e3 for each in rounds], "o-", color=tuple(INK_COLOUR), markersize=4, linewidth=1.4)
     axes.set_ylim(bottom=0)
     other = axes.twinx()
-    other.plot(numbers, [each.utilization for each in rounds], "s--", color=SECOND, markersize=3.5, linewidth=1.0)
-    other.axhline(1.0, color=SECOND, linewidth=0.5)
-    other.set_ylabel("greatest utilization", color=SECOND, fontsize=9)
-    other.tick_params(labelsize=8, colors=SECOND)
+    other.plot(
+        numbers, [each.utilization for each in rounds], "s--", color=SECOND_COLOUR, markersize=3.5, linewidth=1.0
+    )
+    other.axhline(1.0, color=SECOND_COLOUR, linewidth=0.5)
+    other.set_ylabel("greatest utilization", color=SECOND_COLOUR, fontsize=9)
+    other.tick_params(labelsize=8, colors=SECOND_COLOUR)
     other.set_ylim(0, 2)  # a first guess may be far off
     other.spines[["top"]].set_visible(False)
 
@@ -54,9 +56,9 @@ def chart_axes(figure: Any, place: Frame, across: str, up: str, whole: bool = Tr
 
     left, bottom, width, height = place
     axes = figure.add_axes((left + 0.09 * width, bottom + 0.16 * height, 0.80 * width, 0.78 * height))
-    axes.set_xlabel(across, fontsize=9, color=tuple(INK))
-    axes.set_ylabel(up, fontsize=9, color=tuple(INK))
-    axes.tick_params(labelsize=8, colors=tuple(INK))
+    axes.set_xlabel(across, fontsize=9, color=tuple(INK_COLOUR))
+    axes.set_ylabel(up, fontsize=9, color=tuple(INK_COLOUR))
+    axes.tick_params(labelsize=8, colors=tuple(INK_COLOUR))
     if whole:
         axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.spines[["top"]].set_visible(False)

@@ -6,17 +6,17 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ...structure.checks import CLAUSES, MemberChecks, span_of, use_words
+from ...structure.checks import CLAUSES_CHECKED, MemberChecks, span_of, use_words
 from ...structure.options import StructureSettings
 from ...structure.report import StructureReport
 from ...structure.truss import Truss
 from .parts import DataTable, Headline, PointList, ReportPart, SectionHead, Sentence
 from .source import ReportSource, cases_of_state, greatest_stress
-from .words import load_words, support_words
+from .words import load_words, supports_in_words
 
 CLAUSES_USED = (
     ("EN 1993-1-1 table 5.2", "class of the section"),
-    *((f"EN 1993-1-1 {clause.partition(' ')[0]}", clause.partition(" ")[2]) for clause in CLAUSES),
+    *((f"EN 1993-1-1 {clause.partition(' ')[0]}", clause.partition(" ")[2]) for clause in CLAUSES_CHECKED),
     ("EN 1990 6.10, table A1.2(B)", "ULS, psi 0 of table A1.1"),
     ("EN 1990 6.14b", "SLS, characteristic"),
 )
@@ -119,7 +119,7 @@ def _assumptions(truss: Truss, settings: StructureSettings, stability: bool) -> 
     sources = sorted({section.source for section in truss.sections if section.source})
     yield f"Sections: {', '.join(section.name for section in truss.sections)} ({'; '.join(sources) or 'own'})."
     held = int(truss.supports.any(axis=1).sum())
-    yield f"{held:,} supports, {settings.support_type}: {support_words(settings.supports)}."
+    yield f"{held:,} supports, {settings.support_type}: {supports_in_words(settings.supports)}."
     loads = [load_words(load) for load in settings.loads]
     nodes = (
         f"{100 * settings.node_allowance:g} % of the weight of the members is added for the nodes"

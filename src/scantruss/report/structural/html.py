@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from html import escape
 
 from ...export.drawing.structure import drawing_defaults, webp_of
-from ...runtime.ours import MARK
+from ...runtime.ours import MADE_BY
 from .parts import DataTable, Headline, Illustration, Listing, PointList, ReportPart, SectionHead, Sentence
 
 PICTURE_INCHES = 11.0  #: width of a picture in the page, at 100 pixels an inch
@@ -41,9 +41,9 @@ def encode_html(parts: Sequence[ReportPart], view: bytes = b"") -> bytes:
         written.insert(1, f'<iframe title="3D view" srcdoc="{escape(view.decode())}"></iframe>')
     body = "\n".join(written)
     return (
-        f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8">\n<meta name="generator" content="{MARK}">\n'
+        f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8">\n<meta name="generator" content="{MADE_BY}">\n'
         f'<meta name="viewport" content="width=device-width, initial-scale=1"><title>{escape(title)}</title>\n'
-        f'<style>\n{PAGE_STYLE}\n</style></head><body>\n{body}\n<p class="note">{MARK}</p>\n</body></html>\n'
+        f'<style>\n{PAGE_STYLE}\n</style></head><body>\n{body}\n<p class="note">{MADE_BY}</p>\n</body></html>\n'
     ).encode()
 
 

@@ -12,7 +12,7 @@ SUPPORT_NAMES = {
 SUPPORT_KINDS = {"loop": "boundary loop {}", "line": "line {}", "lowest": "nodes up to {} above the lowest"}
 
 
-def support_words(where: str) -> str:
+def supports_in_words(where: str) -> str:
     """Return in words which nodes are supported, such as "boundary loop 1 and corners of the boundary"."""
     found = []
     for word in where.split("+"):

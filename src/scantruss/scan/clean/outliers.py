@@ -40,7 +40,7 @@ OPEN_EDGE = 0.05
 # fewest of these; most at a free edge, in square roots of their number: hardly more than three sides of a square
 MANY_OF_PART, EDGE_OF_COMPACT = 200, 3.3
 # the same of a part of fewer points, of which some lie so deep in it that it is no fringe: distance from the rest of the scan [reaches]
-SOME_OF_PART, EDGE_OF_CORNER, DEEP, SHARE_DEEP = 80, 1.55, 3.0, 0.2
+SOME_OF_PART, EDGE_OF_CORNER, DEEP_IN_PART, SHARE_DEEP = 80, 1.55, 3.0, 0.2
 LONE_SHARE = 3e-4  # share of samples without neighbours above which outliers are sought
 ENOUGH_AROUND = 6  # neighbours with which a sample is not alone
 # distance between samples where no member length is given, and within which they have neighbours [spacings of the points]: as those
@@ -122,7 +122,7 @@ def _judged(points: np.ndarray, distance: float) -> tuple[np.ndarray, np.ndarray
     for _ in range(ROUNDS_OF_OUTLIERS):
         thick, aside = _planes(near, which)
         outlier = _stand_alone(near, which, reach, distance, limit)
-        outlier |= (thick > kernels.THICK) & (reach[which] > CLOUD_REACH * usual)
+        outlier |= (thick > kernels.THICK_CLOUD) & (reach[which] > CLOUD_REACH * usual)
         outlier |= _stand_off(near, alive, which, ~outlier & (aside > DOUBT_DISTANCE))
         found = which[outlier]
         if not len(found):
@@ -155,7 +155,7 @@ def _on_sheets(near: Nearby, alive: np.ndarray, reach: np.ndarray, doubted: np.n
     A few in one plane may be random, and a sparse fringe beyond the edge of the scan is no part of it; a wide sparse part there is,
     as what lies far from the scanner.
     """
-    company, at_edge = np.empty((len(doubted), kernels.COMPANY), np.int64), np.zeros(len(doubted), np.bool_)
+    company, at_edge = np.empty((len(doubted), kernels.POINTS_OF_SHEET), np.int64), np.zeros(len(doubted), np.bool_)
     number = np.full(len(alive), -1)
     number[doubted] = np.arange(len(doubted))
     in_parts(
@@ -177,7 +177,7 @@ def _on_sheets(near: Nearby, alive: np.ndarray, reach: np.ndarray, doubted: np.n
         places = np.ascontiguousarray(near.tree.points[doubted[which]])
         others = build_kd_tree(np.ascontiguousarray(near.tree.points[alive]))
         nearest_of_places(others, places, 1, squares, np.empty(len(which), np.int64))
-        deep = np.sqrt(squares) > DEEP * reach[doubted[which]]
+        deep = np.sqrt(squares) > DEEP_IN_PART * reach[doubted[which]]
         compact |= few & (np.bincount(part[which], deep, len(doubted)) >= SHARE_DEEP * size)
     found: np.ndarray = on & ((size >= SMALLEST_PART) & (edges <= OPEN_EDGE * size) | compact)[part]
     return found
@@ -187,7 +187,7 @@ def _clouds(near: Nearby, alive: np.ndarray) -> np.ndarray:
     """Return which points belong to dense clouds (N,) bool: inside these, points spread to all sides, unlike in a crease."""
     which = np.flatnonzero(alive)
     cloud, bulk = np.zeros(len(alive), np.bool_), np.zeros(len(alive))
-    thick = which[_planes(near, which)[0] > kernels.THICK]
+    thick = which[_planes(near, which)[0] > kernels.THICK_CLOUD]
     if not 0 < len(thick) < MOST_OF_CLOUDS * len(which):
         return cloud
     found = np.empty(len(thick))

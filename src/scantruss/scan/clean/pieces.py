@@ -7,7 +7,7 @@ import numpy as np
 from ...kernels.geometry.components import join
 from ...kernels.geometry.kd_tree import nearest_of_places
 from ...kernels.scan import outliers as kernels
-from ...kernels.scan.outliers import THICK
+from ...kernels.scan.outliers import THICK_CLOUD
 from .nearby import REACH_TO, Nearby, build_kd_tree
 
 LINK_REACH = 3.0  # reaches over which points belong to one piece
@@ -32,7 +32,7 @@ def find_loose_pieces(near: Nearby, share: float) -> np.ndarray:
     sizes = np.bincount(piece, minlength=count)
     thick, aside = np.empty((2, count))
     kernels.measure_planes(near.tree, np.arange(count), near.neighbors, thick, aside, 0, count)
-    blob = np.bincount(piece, thick > THICK, minlength=count) > 0.5 * sizes
+    blob = np.bincount(piece, thick > THICK_CLOUD, minlength=count) > 0.5 * sizes
     least = np.minimum(np.maximum(share * count, REACH_TO) * np.where(blob, BLOB_POINTS, 1.0), float(sizes.max()))
     clouds = np.flatnonzero(blob & (sizes >= least))
     loose = (sizes[piece] < least[piece]) | _small_clouds(near.tree.points, piece, clouds, int(sizes.argmax()))

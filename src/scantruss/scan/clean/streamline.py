@@ -10,6 +10,7 @@ import numpy as np
 from ...kernels.geometry.boxes import new_boxes
 from ...kernels.scan import nearby
 from ...kernels.scan import streamline as kernels
+from ...runtime.jit import new_record
 from ...runtime.parallel import in_parts, processors
 from ..cloud import Bounds
 
@@ -60,13 +61,13 @@ class _First:
 
     def __init__(self, points: np.ndarray, lower: np.ndarray, upper: np.ndarray, size: float, room: int) -> None:
         self.points, self.boxes = points, new_boxes(lower, upper, size, 0, 0)
-        self.found, self.count = np.empty(0, np.int64), np.zeros(2, np.int64)
+        self.found, self.counts = np.empty(0, np.int64), new_record(kernels.CHOSEN_COUNTS)
         self._make_room(room)
 
     @property
     def chosen(self) -> np.ndarray:
         """The points found so far (K,) int64."""
-        return self.found[: self.count[kernels.CHOSEN]]
+        return self.found[: self.counts.points]
 
     def choose(self, among: np.ndarray, begin: int, end: int) -> None:
         """Look at the points `among` (M,) from `begin` to `end` - 1, or among all points for EVERY_POINT."""
@@ -77,13 +78,13 @@ class _First:
 
     def _choose(self, among: np.ndarray, begin: int, end: int) -> int:
         return kernels.choose_first(
-            self.points, self.boxes, self.blocks, self.taken, among, self.found, begin, end, self.count
+            self.points, self.boxes, self.blocks, self.taken, among, self.found, begin, end, self.counts
         )
 
     def _make_room(self, room: int) -> None:
         """Make room for so many points and their blocks, at least four times as many blocks as there are."""
-        old, rows = self.chosen, max(room // FILLED_BOXES, 4 * int(self.count[kernels.BLOCKS]), 1)
-        self.found, self.count = np.empty(room, np.int64), np.zeros(2, np.int64)
+        old, rows = self.chosen, max(room // FILLED_BOXES, 4 * int(self.counts.blocks), 1)
+        self.found, self.counts = np.empty(room, np.int64), new_record(kernels.CHOSEN_COUNTS)
         self.taken = np.zeros((rows, kernels.BLOCK_BYTES), np.uint8)
         table = new_boxes(np.zeros(3), np.ones(3), 1.0, rows, rows)
         self.blocks = table._replace(counts=self.boxes.counts // kernels.BLOCK_SIDE + 1)

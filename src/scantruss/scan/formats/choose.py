@@ -81,11 +81,11 @@ def cropped_boxes(points: np.ndarray, kept: np.ndarray, selection: Selection) ->
         out = points[left[~_crop_test(points, crop)(left)]]
         if len(out):
             words, box = _outside(crop.partition(":")[0]), np.stack([out.min(axis=0), out.max(axis=0)])
-            boxes[words] = box_around([box, boxes[words]] if words in boxes else [box])
+            boxes[words] = box_around_boxes([box, boxes[words]] if words in boxes else [box])
     return boxes
 
 
-def box_around(boxes: Sequence[np.ndarray]) -> np.ndarray:
+def box_around_boxes(boxes: Sequence[np.ndarray]) -> np.ndarray:
     """Return the box (2, 3) around some boxes."""
     return np.stack([np.min([box[0] for box in boxes], axis=0), np.max([box[1] for box in boxes], axis=0)])
 

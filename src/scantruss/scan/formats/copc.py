@@ -14,11 +14,11 @@ from typing import Any, BinaryIO, NamedTuple
 import numpy as np
 
 from ...errors import FormatError
-from .las_header import HEADER_14, LASZIP, RECORD
+from .las_header import HEADER_14, LASZIP_RECORD, RECORD_HEAD_BYTES
 
 RECORD_NAME = b"copc".ljust(16, b"\0") + b"\1\0"  # user and number of the record that describes the octree
 RECORD_BYTES = 160  # its bytes; it is the first of the file
-ENTRY = np.dtype([("key", "<i4", 4), ("place", "<u8"), ("size", "<i4"), ("count", "<i4")])  # of the table
+TABLE_ENTRY = np.dtype([("key", "<i4", 4), ("place", "<u8"), ("size", "<i4"), ("count", "<i4")])  # of the table
 TABLE_ELSEWHERE = -1  # count of an entry that says where more of the table is
 DEEPEST_OCTREE_LEVEL = 30  # level of an octree
 OCTREE_TOLERANCE = 1e-9  # of the octree's side; coordinates are rounded
@@ -48,10 +48,10 @@ def find_boxes(path: Path, header: Any) -> Boxes | None:
     """Return the boxes of a file; None if it is no COPC or its table does not match its points, so that all must be read."""
     with path.open("rb") as file:
         file.seek(HEADER_14)
-        record = file.read(RECORD + RECORD_BYTES)
-        if len(record) < RECORD + RECORD_BYTES or record[2:20] != RECORD_NAME:
+        record = file.read(RECORD_HEAD_BYTES + RECORD_BYTES)
+        if len(record) < RECORD_HEAD_BYTES + RECORD_BYTES or record[2:20] != RECORD_NAME:
             return None
-        x, y, z, half, _, place, size = unpack_from("<5d2Q", record, RECORD)
+        x, y, z, half, _, place, size = unpack_from("<5d2Q", record, RECORD_HEAD_BYTES)
         entries = _read_table(file, place, size, path.stat().st_size)
         if not _fit(entries, _chunks_of(file, header), header):
             return None
@@ -72,14 +72,14 @@ def find_boxes(path: Path, header: Any) -> Boxes | None:
 
 def _read_table(file: BinaryIO, place: int, size: int, end: int) -> np.ndarray:
     """Return the entries of a table that have points, in the order of the file; as far as it can be followed."""
-    pages, found, left = [(place, size)], [np.empty(0, ENTRY)], end
+    pages, found, left = [(place, size)], [np.empty(0, TABLE_ENTRY)], end
     while pages:
         place, size = pages.pop()
         if not 0 < size <= min(end - place, left):  # nor more entries than the file holds: a page may refer to itself
             continue
         left -= size
         file.seek(place)
-        entries = np.frombuffer(file.read(size // ENTRY.itemsize * ENTRY.itemsize), ENTRY)
+        entries = np.frombuffer(file.read(size // TABLE_ENTRY.itemsize * TABLE_ENTRY.itemsize), TABLE_ENTRY)
         more = entries[entries["count"] == TABLE_ELSEWHERE]
         pages += zip(more["place"].tolist(), more["size"].tolist(), strict=True)
         found.append(entries[entries["count"] > 0])
@@ -98,7 +98,7 @@ def _chunks_of(file: BinaryIO, header: Any) -> np.ndarray:
 
 def _described(header: Any) -> bytes:
     """Return the record that describes how points are packed."""
-    return next((bytes(vlr.record_data_bytes()) for vlr in header.vlrs if vlr.record_id == LASZIP), b"")
+    return next((bytes(vlr.record_data_bytes()) for vlr in header.vlrs if vlr.record_id == LASZIP_RECORD), b"")
 
 
 def _fit(entries: np.ndarray, chunks: np.ndarray, header: Any) -> bool:

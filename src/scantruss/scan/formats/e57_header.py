@@ -14,13 +14,13 @@ import numpy as np
 
 from ...errors import FormatError
 
-PAGE = 1024  # bytes
-DATA = 1020  # bytes of a page that are data
+PAGE_BYTES = 1024  # bytes
+DATA_BYTES = 1020  # bytes of a page that are data
 MOST_PAGES = 1 << 14  # pages checked at a time
-POLYNOMIAL = 0x82F63B78  # Castagnoli's, bits reversed
+CHECKSUM_POLYNOMIAL = 0x82F63B78  # Castagnoli's, bits reversed
 CARTESIAN = ("cartesianX", "cartesianY", "cartesianZ")
 SPHERICAL = ("sphericalRange", "sphericalAzimuth", "sphericalElevation")
-FLOATS = {"double": 64, "single": 32}
+BITS_OF_FLOAT = {"double": 64, "single": 32}
 
 
 @dataclass(frozen=True)
@@ -61,21 +61,21 @@ def read_pages(path: Path) -> np.ndarray:
     if len(head) < 48:
         raise FormatError(f"{path} ends within its E57 header; copy it again")
     length, page = struct.unpack("<Q", head[16:24])[0], struct.unpack("<Q", head[40:48])[0]
-    if page != PAGE:
-        raise FormatError(f"{path} says that its pages have {page} bytes, E57 has {PAGE}; the file is damaged")
-    if size < length or size % PAGE:
+    if page != PAGE_BYTES:
+        raise FormatError(f"{path} says that its pages have {page} bytes, E57 has {PAGE_BYTES}; the file is damaged")
+    if size < length or size % PAGE_BYTES:
         raise FormatError(f"{path} ends early: its header promises {length:,} bytes, got {size:,}; copy it again")
-    pages = np.memmap(path, dtype=np.uint8, mode="r").reshape(-1, PAGE)
-    stated = np.ascontiguousarray(pages[:, DATA:]).view(">u4")[:, 0]
+    pages = np.memmap(path, dtype=np.uint8, mode="r").reshape(-1, PAGE_BYTES)
+    stated = np.ascontiguousarray(pages[:, DATA_BYTES:]).view(">u4")[:, 0]
     wrong = np.flatnonzero(checksums(pages) != stated)
     if len(wrong):
         raise FormatError(f"{path} is damaged: page {wrong[0] + 1} of {len(pages)} has a wrong checksum; copy it again")
-    return pages[:, :DATA].reshape(-1)
+    return pages[:, :DATA_BYTES].reshape(-1)
 
 
 def logical(place: int) -> int:
     """Return the offset in the data of an offset in the file."""
-    return place // PAGE * DATA + min(place % PAGE, DATA)
+    return place // PAGE_BYTES * DATA_BYTES + min(place % PAGE_BYTES, DATA_BYTES)
 
 
 def checksums(pages: np.ndarray) -> np.ndarray:
@@ -84,7 +84,9 @@ def checksums(pages: np.ndarray) -> np.ndarray:
     sums = np.empty(len(pages), dtype=np.uint32)
     for begin in range(0, len(pages), MOST_PAGES):
         words = (
-            np.ascontiguousarray(pages[begin : begin + MOST_PAGES, :DATA]).view("<u2").T.astype(np.uint32, order="C")
+            np.ascontiguousarray(pages[begin : begin + MOST_PAGES, :DATA_BYTES])
+            .view("<u2")
+            .T.astype(np.uint32, order="C")
         )
         state = np.full(words.shape[1], 0xFFFFFFFF, dtype=np.uint32)
         for word in words:
@@ -98,7 +100,7 @@ def _table() -> np.ndarray:
     """Return the CRC of each pair of bytes after 16 shifts, (65536,) uint32."""
     table: np.ndarray = np.arange(1 << 16, dtype=np.uint32)
     for _ in range(16):
-        table = (table >> 1) ^ np.where(table & 1, np.uint32(POLYNOMIAL), np.uint32(0))
+        table = (table >> 1) ^ np.where(table & 1, np.uint32(CHECKSUM_POLYNOMIAL), np.uint32(0))
     return table
 
 
@@ -143,7 +145,7 @@ def _field(child: ElementTree.Element) -> E57Field:
     kind = child.attrib.get("type", "")
     if kind == "Float":
         precision = "single" if child.attrib.get("precision") == "single" else "double"
-        return E57Field(child.tag, precision, bits=FLOATS[precision])
+        return E57Field(child.tag, precision, bits=BITS_OF_FLOAT[precision])
     if kind not in ("Integer", "ScaledInteger"):
         raise ValueError(f"field {child.tag} of type {kind!r}")
     low, high = int(child.attrib.get("minimum", -(2**63))), int(child.attrib.get("maximum", 2**63 - 1))

@@ -30,7 +30,7 @@ FIELD_OF_ATTRIBUTE = {
 LOST_OF_SPACING = 1e-3  # rounding of a coordinate, as a share of the spacing
 LARGEST_INT32 = float(2**31 - 2)  # a coordinate is a whole number of 32 bits
 UNIT_CODES = {"m": 9001, "foot": 9002}  # EPSG
-WITHHELD = "marked as withheld"  # the format's term for deleted
+WITHHELD_POINTS = "marked as withheld"  # the format's term for deleted
 
 Places = Callable[[Content], list[WantedBox]]  # by the units that a file states
 
@@ -44,7 +44,7 @@ def read_las(path: Path, wanted: Sequence[str] = (), places_of: Places | None = 
     with reading_as(path, "LAS or LAZ"):
         notes = check_header(path)
         promised, described, chunks = _read(path, names, places_of)
-    withheld = sum(chunk.left_out.get(WITHHELD, 0) for chunk in chunks)
+    withheld = sum(chunk.left_out.get(WITHHELD_POINTS, 0) for chunk in chunks)
     unread = sum(described.unread.values())
     points = np.concatenate([np.empty((0, 3)), *(chunk.points for chunk in chunks)])
     check_count(path, promised, len(points) + withheld + unread)
@@ -52,7 +52,7 @@ def read_las(path: Path, wanted: Sequence[str] = (), places_of: Places | None = 
     held = [name for name in names if all(name in chunk.attributes for chunk in chunks)]
     attributes = {name: np.concatenate([none, *(chunk.attributes[name] for chunk in chunks)]) for name in held}
     feet = look_like_feet(points, attributes["return_count"]) if described.z_metres is None else ""
-    left_out = {WITHHELD: withheld} if withheld else {}
+    left_out = {WITHHELD_POINTS: withheld} if withheld else {}
     return replace(described, points=points, attributes=attributes, left_out=left_out, feet=feet, notes=notes)
 
 
@@ -74,7 +74,7 @@ def content_of_records(record: Any, names: Sequence[str]) -> Content:
     kept = np.array(record["withheld"]) == 0
     if kept.all():
         return Content(points, attributes)
-    left_out = {WITHHELD: len(kept) - int(kept.sum())}
+    left_out = {WITHHELD_POINTS: len(kept) - int(kept.sum())}
     return Content(points[kept], {name: values[kept] for name, values in attributes.items()}, left_out=left_out)
 
 

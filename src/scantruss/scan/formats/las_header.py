@@ -12,11 +12,12 @@ from ...errors import FormatError
 
 LEAST_HEADER = 227  # bytes, of LAS 1.0 to 1.2
 HEADER_14 = 375  # bytes of the header of LAS 1.4
-WAVES = 227  # where a header from LAS 1.3 on says where packets of waves begin
-LASZIP = 22204  # number of the record that describes how points are packed
+WAVES_AT = 227  # where a header from LAS 1.3 on says where packets of waves begin
+LASZIP_RECORD = 22204  # number of the record that describes how points are packed
 MOST_IN_CHUNK = 1 << 20  # points of one chunk, where the file holds fewer; room is made for all of them
-ONES = (1 << 64) - 1  # a count of 64 bits that is not known yet
-RECORD, EXTENDED = 54, 60  # bytes of the header of a variable length record, and of an extended one
+UNKNOWN_COUNT = (1 << 64) - 1  # a count of 64 bits that is not known yet
+# bytes of the header of a variable length record, and of an extended one
+RECORD_HEAD_BYTES, EXTENDED_HEAD_BYTES = 54, 60
 
 
 def check_header(path: Path) -> tuple[str, ...]:
@@ -31,7 +32,7 @@ def check_header(path: Path) -> tuple[str, ...]:
         scales = np.frombuffer(head, "<f8", 6, 131)
         if not np.isfinite(scales).all() or not scales[:3].all() or np.abs(scales).max() > 1e50:
             raise FormatError(f"{path}: scale and offset of its LAS header are not sensible numbers; export it again")
-        if length < LEAST_HEADER or start > size or length + RECORD * records > start:
+        if length < LEAST_HEADER or start > size or length + RECORD_HEAD_BYTES * records > start:
             raise FormatError(
                 f"{path} ends early: its LAS header promises records and points behind its end; copy it again"
             )
@@ -43,13 +44,15 @@ def check_header(path: Path) -> tuple[str, ...]:
             end = min(place, size) if extended else size
             for _ in range(extended):
                 file.seek(min(place, size))
-                entry = file.read(EXTENDED)
-                place += EXTENDED + (struct.unpack_from("<Q", entry, 20)[0] if len(entry) == EXTENDED else size)
+                entry = file.read(EXTENDED_HEAD_BYTES)
+                place += EXTENDED_HEAD_BYTES + (
+                    struct.unpack_from("<Q", entry, 20)[0] if len(entry) == EXTENDED_HEAD_BYTES else size
+                )
                 if place > size:
                     raise FormatError(
                         f"{path} ends early: its LAS header promises records behind its end; copy it again"
                     )
-        if head[25] >= 3 and length >= WAVES + 8 and (waves := struct.unpack_from("<Q", head, WAVES)[0]):
+        if head[25] >= 3 and length >= WAVES_AT + 8 and (waves := struct.unpack_from("<Q", head, WAVES_AT)[0]):
             end = min(waves, end)
         if form & 0xC0:
             room = _check_packed(path, size, length, records, start, width, count)
@@ -74,11 +77,11 @@ def _check_packed(path: Path, size: int, length: int, records: int, start: int, 
 
     early = FormatError(f"{path} ends early: the table of its packed points is not whole; copy it again")
     with path.open("rb") as file:
-        described = _find_record(file, length, records, LASZIP)
+        described = _find_record(file, length, records, LASZIP_RECORD)
         file.seek(start)
         words = file.read(8)
         table = struct.unpack("<Q", words)[0] if len(words) == 8 else 0
-        if table == ONES:  # a writer that could not seek wrote it at the end
+        if table == UNKNOWN_COUNT:  # a writer that could not seek wrote it at the end
             file.seek(size - 8)
             table = struct.unpack("<Q", file.read(8))[0]
         if len(described) < 34 or not start + 8 <= table <= size - 8:
@@ -115,11 +118,11 @@ def _find_record(file: BinaryIO, place: int, records: int, number: int) -> bytes
     """Return the content of a variable length record; empty if there is none."""
     for _ in range(records):
         file.seek(place)
-        entry = file.read(RECORD)
-        if len(entry) < RECORD:
+        entry = file.read(RECORD_HEAD_BYTES)
+        if len(entry) < RECORD_HEAD_BYTES:
             return b""
         found, long = struct.unpack_from("<HH", entry, 18)
         if found == number:
             return file.read(long)
-        place += RECORD + long
+        place += RECORD_HEAD_BYTES + long
     return b""

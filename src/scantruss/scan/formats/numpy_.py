@@ -20,7 +20,7 @@ from .content import Cloud, Content
 from .kinds import read_head, reading_as, wrong_kind
 from .packed import check_size
 
-UNNAMED = "arr_0"  # the first array that was saved without a name
+UNNAMED_ARRAY = "arr_0"  # the first array that was saved without a name
 #: names of arrays of points, cleaned; the first that is there
 POINTS = (
     "points", "xyz", "positions", "vertices", "coords", "coordinates", "pts", "position", "pos", "verts", "cloud", "pointcloud",
@@ -97,7 +97,7 @@ def _name_of_points(arrays: Any, path: Path) -> tuple[str, tuple[str, ...]]:
         best = large[0]
     if best is not None:
         others = [name for name in large if name != best]
-        known = best != UNNAMED or not others
+        known = best != UNNAMED_ARRAY or not others
         return best, () if known else (f"the points of {path.name} are taken from {best}, and not {' '.join(others)}",)
     if large:
         raise FormatError(

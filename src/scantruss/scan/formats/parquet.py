@@ -15,7 +15,7 @@ from .columns import check_not_degrees, find_attributes, find_columns
 from .content import Content
 from .kinds import read_head, reading_as, wrong_kind
 
-BATCH = 1 << 18  # rows
+ROWS_AT_ONCE = 1 << 18  # rows
 
 
 def read_parquet(path: Path, wanted: Sequence[str] = ()) -> Content:
@@ -50,7 +50,7 @@ def _read(path: Path, file: Any, wanted: Sequence[str]) -> Content:
     places = [*columns, *found.values()]
     chosen = list(dict.fromkeys(names[place] for place in places))
     parts = []
-    for batch in file.iter_batches(BATCH, columns=chosen):
+    for batch in file.iter_batches(ROWS_AT_ONCE, columns=chosen):
         parts.append(np.column_stack([_numbers(path, batch, names[place]) for place in places]))
     table = np.concatenate(parts) if parts else np.empty((0, len(places)))
     attributes = {name: table[:, 3 + i] for i, name in enumerate(found)}

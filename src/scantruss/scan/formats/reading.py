@@ -15,7 +15,7 @@ from ...selection import Selection
 from ..checks import degrees_note, extent_note, extent_of, single_precision_note
 from ..cloud import PointCloud
 from ..units import check_unit, name_of
-from .choose import box_around, check_attributes, choose, cropped_boxes, describe_points, places_in
+from .choose import box_around_boxes, check_attributes, choose, cropped_boxes, describe_points, places_in
 from .columns import NORMAL_COLUMNS
 from .common_unit import to_common_unit
 from .content import Content
@@ -89,7 +89,9 @@ def read_points(path: FileNames, unit: str = "", selection: Selection | None = N
     notes = (*notes, *cloud.notes, *degrees_note(cloud), *single_precision_note(cloud))
     every = [part.cropped for part in parts]
     cropped = {
-        words: box_around([boxes[words] for boxes in every if words in boxes]) for boxes in every for words in boxes
+        words: box_around_boxes([boxes[words] for boxes in every if words in boxes])
+        for boxes in every
+        for words in boxes
     }
     return replace(
         cloud, notes=notes, left_out=tuple(left_out.items()), cropped=tuple(cropped.items()), system=common_system

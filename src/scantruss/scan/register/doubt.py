@@ -26,7 +26,7 @@ AS_MUCH = 0.2  # least share of the places that agree now which must agree there
 LEAST_OF_ALL = 0.08  # least share of all places of the scan which must agree there
 OTHER_PLACE_DISTANCE = 1.5  # distance beyond which a place is another one [coarse spacings]
 FEWEST_SCANS = 3  # fewest scans that can decide between several ways
-PUSH = 4.0  # distance by which a scan is shifted to see whether it returns [coarse spacings]
+SHIFT_OF_DOUBT = 4.0  # distance by which a scan is shifted to see whether it returns [coarse spacings]
 
 
 def leave_out_doubtful(
@@ -107,7 +107,7 @@ def _pushed(scan: Scan, pose: np.ndarray) -> list[np.ndarray]:
     points = move(pose, scan.coarse.points)
     centre = points.mean(axis=0)
     axes = np.linalg.eigh(np.cov((points - centre).T))[1].T
-    far = PUSH * scan.coarse.spacing
+    far = SHIFT_OF_DOUBT * scan.coarse.spacing
     arm = float(np.sqrt(((points - centre) ** 2).sum(axis=1).mean()))
     none = np.zeros(3)
     found = []

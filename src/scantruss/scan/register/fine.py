@@ -8,14 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...kernels.scan import overlap as kernels
-from ...kernels.scan.overlap import MOTION
+from ...kernels.scan.overlap import MOTION_NUMBERS
 from .poses import invert, small_motion
 from .views import View
 
 PLANE_STIFFNESS = 1000.0  # stiffness across the surface over that along it
 MOST_STEPS = 10  # most steps with one reach
 LAST_STEP = 5e-3  # a step that moves no place farther than this share of the spacing is the last
-DAMPING = 1e-6  # share of the stiffness added, so that directions that slide freely stay at rest
+DAMPING_SHARE = 1e-6  # share of the stiffness added, so that directions that slide freely stay at rest
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +71,7 @@ def align(
             count = add_pairs(sums, first, second, pose, np.eye(4), turn, reach, centre, every)
             if count < 6:
                 return pose
-            step = solve_step(sums[:MOTION, :MOTION], sums[:MOTION, MOTION], 0.5 * size)
+            step = solve_step(sums[:MOTION_NUMBERS, :MOTION_NUMBERS], sums[:MOTION_NUMBERS, MOTION_NUMBERS], 0.5 * size)
             pose = small_motion(step[:3], step[3:], centre[0]) @ pose
             if np.linalg.norm(step[:3]) * size + np.linalg.norm(step[3:]) < LAST_STEP * first.spacing:
                 break
@@ -102,8 +102,8 @@ def add_pairs(
             np.ascontiguousarray(one), np.ascontiguousarray(invert(other) @ one),
             turn, every, reach, soft, PLANE_STIFFNESS, centre, part,
         )  # fmt: skip
-        part[MOTION, :MOTION] *= sign
-        part[:MOTION, MOTION] *= sign
+        part[MOTION_NUMBERS, :MOTION_NUMBERS] *= sign
+        part[:MOTION_NUMBERS, MOTION_NUMBERS] *= sign
         sums += part
     return count
 
@@ -115,7 +115,7 @@ def solve_step(stiffness: np.ndarray, load: np.ndarray, arm: float) -> np.ndarra
     """
     scale = np.tile([1.0 / arm] * 3 + [1.0] * 3, len(load) // 6)
     matrix = stiffness * scale[:, None] * scale
-    matrix[np.diag_indices(len(load))] += DAMPING * np.trace(matrix) / len(load) + 1e-300
+    matrix[np.diag_indices(len(load))] += DAMPING_SHARE * np.trace(matrix) / len(load) + 1e-300
     rest = -load * scale
     for k in range(len(load)):  # by hand: a library may round differently with other numbers of threads
         factor = matrix[k + 1 :, k] / matrix[k, k]
@@ -127,12 +127,12 @@ def solve_step(stiffness: np.ndarray, load: np.ndarray, arm: float) -> np.ndarra
     return scale * step
 
 
-def judge(first: View, second: View, pose: np.ndarray, turn: float, near: float, reach: float) -> Fit:
+def judge_pair(first: View, second: View, pose: np.ndarray, turn: float, near: float, reach: float) -> Fit:
     """Return how two scans agree under a pose (4, 4) of the first in the frame of the second; near and reach [scan unit]."""
     shares, over = [], []
     all_agreeing, all_against, all_squares = 0, 0, 0.0
     for a, b, back in ((first, second, pose), (second, first, invert(pose))):
-        agreeing, against, squares = kernels.judge(
+        agreeing, against, squares = kernels.judge_overlap(
             a.points, a.normals, b.points, b.normals, b.on_boundary, b.boxes,
             np.ascontiguousarray(back), turn, b.spacing, near, reach,
         )  # fmt: skip

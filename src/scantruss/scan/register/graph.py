@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...kernels.scan.overlap import MOTION
-from .fine import Fit, add_pairs, judge, solve_step
+from ...kernels.scan.overlap import MOTION_NUMBERS
+from .fine import Fit, add_pairs, judge_pair, solve_step
 from .pairs import DISAGREEING_DISTANCE, Pair, judge_views, nearness
 from .poses import invert, move, small_motion
 from .scans import Scan
@@ -21,11 +21,11 @@ from .views import View
 
 SURE_AGREEMENT = 0.88  # agreement of two groups at which they belong together
 AGREEING_SHARE = 0.08  # share of the smaller group's places that must agree
-CONTRADICTION = 0.6  # agreement of two overlapping scans below which they contradict a pair of groups
-CONTRADICTED = 0.08  # least share of the places of the smaller one for that to count
+CONTRADICTING_AGREEMENT = 0.6  # agreement of two overlapping scans below which they contradict a pair of groups
+CONTRADICTED_SHARE = 0.08  # least share of the places of the smaller one for that to count
 CLEAR_LEAD = 0.03  # difference in agreement by which one way is clearly better than another
 MOST_WAYS = 12  # pairs that are tried between two groups
-LINKED = 0.02  # least overlap by which two scans are connected
+LINKING_OVERLAP = 0.02  # least overlap by which two scans are connected
 PLACES_PER_STEP = 2000  # places of a scan used in a step of all scans
 
 
@@ -38,7 +38,7 @@ class Group:
     turns: dict[int, float]  #: 1, or -1 for those whose normals face the other side
 
 
-def assemble(
+def assemble_poses(
     scans: list[Scan], pairs: list[Pair], progress: Callable[[str, float], None]
 ) -> tuple[list[Group], set[int]]:
     """Return the groups formed by the pairs, the largest first, and the scans that fit in more ways than one.
@@ -147,7 +147,7 @@ def _fit_between(scans: list[Scan], whole: Group, one: Group, other: Group, *, l
         for j in other.members:
             fit = fit_of(scans, whole, i, j)
             over = (fit.agreeing + fit.against) / (2.0 * min(len(scans[k].middle.points) for k in (i, j)))
-            if over > CONTRADICTED and fit.agreement < (0.5 if loose else 1.0) * CONTRADICTION:
+            if over > CONTRADICTED_SHARE and fit.agreement < (0.5 if loose else 1.0) * CONTRADICTING_AGREEMENT:
                 return None
             fits.append(fit)
     agreeing, against = sum(fit.agreeing for fit in fits), sum(fit.against for fit in fits)
@@ -173,13 +173,13 @@ def fine_fit_of(scans: list[Scan], group: Group, first: int, second: int) -> Fit
     one, other = scans[first], scans[second]
     pose = invert(group.poses[second]) @ group.poses[first]
     near, reach = nearness(one.middle, other.middle), DISAGREEING_DISTANCE * one.middle.spacing
-    return judge(one.fine, other.fine, pose, group.turns[first] * group.turns[second], near, reach)
+    return judge_pair(one.fine, other.fine, pose, group.turns[first] * group.turns[second], near, reach)
 
 
 def links_of(scans: list[Scan], group: Group, *, against: bool = False) -> dict[tuple[int, int], Fit]:
     """Return how overlapping scans of a group agree, pair by pair; with `against` also overlaps without agreement."""
     pairs = pairs_as_they_lie(scans, group)
-    return {(p.first, p.second): p.fit for p in pairs if (p.fit.over if against else p.fit.share) >= LINKED}
+    return {(p.first, p.second): p.fit for p in pairs if (p.fit.over if against else p.fit.share) >= LINKING_OVERLAP}
 
 
 def pairs_as_they_lie(scans: list[Scan], group: Group) -> list[Pair]:
@@ -252,12 +252,12 @@ def _step(
         add_pairs(sums, a, b, group.poses[i], group.poses[j], turn, reach * a.spacing, centre, every)
         sums *= fit.share**2
         p, q = (slice(6 * place[k], 6 * place[k] + 6) for k in (i, j))
-        stiffness[p, p] += sums[:MOTION, :MOTION]
-        stiffness[q, q] += sums[:MOTION, :MOTION]
-        stiffness[p, q] -= sums[:MOTION, :MOTION]
-        stiffness[q, p] -= sums[:MOTION, :MOTION]
-        load[p] += sums[:MOTION, MOTION]
-        load[q] -= sums[:MOTION, MOTION]
+        stiffness[p, p] += sums[:MOTION_NUMBERS, :MOTION_NUMBERS]
+        stiffness[q, q] += sums[:MOTION_NUMBERS, :MOTION_NUMBERS]
+        stiffness[p, q] -= sums[:MOTION_NUMBERS, :MOTION_NUMBERS]
+        stiffness[q, p] -= sums[:MOTION_NUMBERS, :MOTION_NUMBERS]
+        load[p] += sums[:MOTION_NUMBERS, MOTION_NUMBERS]
+        load[q] -= sums[:MOTION_NUMBERS, MOTION_NUMBERS]
     moves = np.zeros((count, 6))
     if count > 1:
         moves[1:] = solve_step(stiffness[6:, 6:], load[6:], 0.5 * size).reshape(-1, 6)

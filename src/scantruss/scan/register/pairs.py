@@ -11,7 +11,7 @@ from itertools import chain
 import numpy as np
 
 from ...runtime.parallel import threaded_map
-from .fine import Fit, align, judge
+from .fine import Fit, align, judge_pair
 from .matching import find_candidates
 from .scans import Scan
 from .views import View
@@ -56,7 +56,7 @@ def nearness(first: View, second: View) -> float:
 
 def judge_views(first: View, second: View, pose: np.ndarray, turn: float) -> Fit:
     """Return how two views agree under a pose (4, 4)."""
-    return judge(first, second, pose, turn, nearness(first, second), DISAGREEING_DISTANCE * first.spacing)
+    return judge_pair(first, second, pose, turn, nearness(first, second), DISAGREEING_DISTANCE * first.spacing)
 
 
 def find_pairs(
@@ -113,7 +113,7 @@ def _best(one: Scan, other: Scan, poses: list[np.ndarray], turn: float, near: fl
     """Return the better poses, best first, by the agreement of the coarse views within `near` spacings."""
     spacing = one.coarse.spacing
     scores = [
-        judge(one.coarse, other.coarse, pose, turn, near * spacing, DISAGREEING_DISTANCE * spacing).score
+        judge_pair(one.coarse, other.coarse, pose, turn, near * spacing, DISAGREEING_DISTANCE * spacing).score
         for pose in poses
     ]
     order = sorted(range(len(poses)), key=lambda k: -scores[k])

@@ -11,7 +11,7 @@ import numpy as np
 from ...errors import FormatError
 from .poses import make_pose, quaternion_of
 
-SKEW = 1e-3  # deviation from a rotation above which the file is refused
+LARGEST_SKEW = 1e-3  # deviation from a rotation above which the file is refused
 
 
 def read_poses(path: str | Path) -> dict[str, np.ndarray]:
@@ -50,9 +50,9 @@ def _pose_of(value: Any, where: str) -> np.ndarray:
         raise FormatError(f"{where}: needs a 4 x 4 matrix of numbers, or a rotation R (3 x 3) and a translation t (3)")
     u, _, v = np.linalg.svd(pose[:3, :3])
     if (
-        np.abs(u @ v - pose[:3, :3]).max() > SKEW
+        np.abs(u @ v - pose[:3, :3]).max() > LARGEST_SKEW
         or np.linalg.det(u @ v) < 0.0
-        or np.abs(pose[3] - [0, 0, 0, 1]).max() > SKEW
+        or np.abs(pose[3] - [0, 0, 0, 1]).max() > LARGEST_SKEW
     ):
         raise FormatError(
             f"{where}: the matrix is not a rigid motion; it needs a rotation and a translation, without scale"

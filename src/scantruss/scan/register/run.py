@@ -16,10 +16,10 @@ from .doubt import leave_out_doubtful
 from .features import find_features
 from .fine import Fit, align
 from .graph import (
-    CONTRADICTION,
+    CONTRADICTING_AGREEMENT,
     Group,
     agree_on_pose,
-    assemble,
+    assemble_poses,
     fine_fit_of,
     fit_of,
     links_of,
@@ -59,13 +59,16 @@ class Splice:
     @property
     def contradicting(self) -> tuple[PairFit, ...]:
         """Pairs that overlap without agreeing; only with poses used as given."""
-        return tuple(pair for pair in self.pairs if pair.agreement < CONTRADICTION)
+        return tuple(pair for pair in self.pairs if pair.agreement < CONTRADICTING_AGREEMENT)
 
     @property
     def alone(self) -> tuple[str, ...]:
         """Scans that agree with no other; only with poses used as given."""
         agreeing = {
-            name for pair in self.pairs if pair.agreement >= CONTRADICTION for name in (pair.first, pair.second)
+            name
+            for pair in self.pairs
+            if pair.agreement >= CONTRADICTING_AGREEMENT
+            for name in (pair.first, pair.second)
         }
         return tuple(name for name in self.poses if name not in agreeing)
 
@@ -158,7 +161,7 @@ def _put_together(
         progress("features", 0.0)
         pairs += find_pairs(scans, find_features([scan.coarse for scan in scans]), wanted, progress)
     scans = with_strictness(scans, pairs)
-    groups, doubtful = assemble(scans, rejudge(pairs, scans), progress)
+    groups, doubtful = assemble_poses(scans, rejudge(pairs, scans), progress)
     group = groups[0]
     group, elsewhere = leave_out_doubtful(scans, group, _sure(scans, group, started), progress)
     doubtful |= elsewhere

@@ -14,9 +14,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...kernels.scan.thinning import (
-    NOT_FINITE,
-    ROWS,
-    TOO_FAR,
+    BOX_COUNTS,
     BoxTable,
     add_points,
     add_rows,
@@ -25,11 +23,12 @@ from ...kernels.scan.thinning import (
     middles,
     take_nearest,
 )
+from ...runtime.jit import new_record
 from ...runtime.parallel import run_in_parts
-from ..checks import CAUSE
+from ..checks import LIKELY_CAUSE
 
 FIRST_ROWS = 4096  # rows of a new table
-GROWTH = 1.5  # factor by which a full table grows
+TABLE_GROWTH = 1.5  # factor by which a full table grows
 BOXES_PER_THREAD = 20_000  # fewest boxes that are worth a thread
 
 
@@ -69,7 +68,7 @@ class Thinning:
     @property
     def dropped(self) -> int:
         """Points left out because a coordinate was NaN or infinite."""
-        return int(self._table.counters[NOT_FINITE])
+        return int(self._table.counts.not_finite)
 
     def add(self, points: np.ndarray) -> None:
         """Add points (N, 3) float64 in the scan's own frame [scan unit].
@@ -83,11 +82,11 @@ class Thinning:
         begin = 0
         while (begin := add_points(self._table, points, begin, self.spacing)) < len(points):
             self._grow()
-        if self._table.counters[TOO_FAR]:
+        if self._table.counts.too_far:
             most = np.abs(points[np.isfinite(points).all(axis=1)]).max(initial=0.0)
             raise InputError(
                 f"spacing {self.spacing:g} is too small for points so far from zero, up to {most:.3g}; use a larger one, or where"
-                f" no part of the scan lies there {CAUSE} (--crop leaves these out)"
+                f" no part of the scan lies there {LIKELY_CAUSE} (--crop leaves these out)"
             )
         self.points += len(points)
 
@@ -96,14 +95,14 @@ class Thinning:
         begin = 0
         while (begin := add_rows(self._table, part.rows, part.extremes, begin)) < len(part.rows):
             self._grow()
-        self._table.counters[NOT_FINITE] += part.dropped
+        self._table.counts.not_finite += part.dropped
         self.points += part.points
 
     def _grow(self) -> None:
         """Make room for more boxes; old arrays are released as early as possible."""
-        slots, rows, extremes, counters = self._table
+        slots, rows, extremes, counts = self._table
         del self._table
-        count, capacity = int(counters[ROWS]), int(GROWTH * len(rows))
+        count, capacity = int(counts.rows), int(TABLE_GROWTH * len(rows))
         few = _slots_for(capacity) > len(slots)
         if few:
             del slots
@@ -112,11 +111,11 @@ class Thinning:
         if few:
             slots = np.full(_slots_for(capacity), -1, np.int64)
             fill_slots(slots, rows, count)
-        self._table = BoxTable(slots, rows, extremes, counters)
+        self._table = BoxTable(slots, rows, extremes, counts)
 
     def take_rows(self) -> BoxRows:
         """Return all boxes sorted by their numbers i, j, k, the same for any order of the points; none are left here."""
-        table, count = self._table, int(self._table.counters[ROWS])
+        table, count = self._table, int(self._table.counts.rows)
         rows, extremes = table.rows[:count], table.extremes[:count]
         order = np.lexsort((rows[:, 2], rows[:, 1], rows[:, 0]))
         for column in (*rows.T, *extremes.T):  # in place: they may fill the memory
@@ -167,8 +166,9 @@ def points_at_boundary(rows: BoxRows, spacing: float) -> np.ndarray:
     The mean of a box at the boundary lies up to half a box inside; its outermost points do not.
     """
     kept = np.zeros((len(rows.rows), 6), np.int64)
-    counters = np.array([len(rows.rows), 0, 0])
-    table = BoxTable(_filled_slots(rows.rows), rows.rows, rows.extremes, counters)
+    counts = new_record(BOX_COUNTS)
+    counts.rows = len(rows.rows)
+    table = BoxTable(_filled_slots(rows.rows), rows.rows, rows.extremes, counts)
     means = means_of(rows.rows, spacing)
     run_in_parts(len(kept), BOXES_PER_THREAD, choose_boundary_points, table, means, spacing, kept)
     several = rows.rows[:, 3] > 1  # a single point is its own mean
@@ -221,7 +221,7 @@ def _new_table(capacity: int, boundary: bool) -> BoxTable:
         np.full(_slots_for(capacity), -1, np.int64),
         np.empty((capacity, 7), np.int64),
         np.empty((capacity if boundary else 0, 18)),
-        np.zeros(3, np.int64),
+        new_record(BOX_COUNTS),
     )
 
 

@@ -18,7 +18,7 @@ from ..formats.columns import COLUMN_NAMES, find_attributes
 from ..formats.dxf_points import metres_of_dxf
 from ..formats.geotiff import terrain_head
 from ..formats.kinds import kind_of, read_head, reading_as, wrong_kind
-from ..formats.las_header import LASZIP, check_header
+from ..formats.las_header import LASZIP_RECORD, check_header
 from ..formats.numpy_ import is_turned, metres_of_npz, read_array_header
 from ..formats.packed import unpacked
 from ..formats.parquet import metres_of_parquet
@@ -39,7 +39,7 @@ TEXT_POINT = 24  # bytes of a line of a text file, about, or more
 MOST_COLUMNS = 1000  # of an array; it is read whole where it has more
 BYTES_SAMPLED = 1 << 14  # bytes looked at, at the start, in the middle and at the end
 LEAST_LINE = 6  # bytes: "1 2 3" and its end
-TEXTS = tuple(suffix for suffix, reader in READERS.items() if reader is READERS[".xyz"])
+TEXT_SUFFIXES = tuple(suffix for suffix, reader in READERS.items() if reader is READERS[".xyz"])
 
 
 def find_source(path: str | Path, wanted: Sequence[str] = ()) -> Source:
@@ -62,7 +62,7 @@ def find_source(path: str | Path, wanted: Sequence[str] = ()) -> Source:
             return source
         if suffix == ".npy" and (source := _npy(path)) is not None:
             return source
-        if suffix in TEXTS and (source := _text(path, head, wanted)) is not None:
+        if suffix in TEXT_SUFFIXES and (source := _text(path, head, wanted)) is not None:
             return source
         if suffix == PACKED and Path(path.stem).suffix.lower() in READERS:
             with unpacked(path) as inner:
@@ -85,7 +85,7 @@ def _metres(path: Path) -> tuple[float | None, float | None]:
         return metres_of_npz(path), None
     if suffix == ".parquet":
         return metres_of_parquet(path)
-    if suffix in TEXTS:
+    if suffix in TEXT_SUFFIXES:
         layout = find_layout(path)
         return layout.metres, layout.z_metres
     if suffix == ".3mf":
@@ -152,7 +152,7 @@ def _has_uneven_chunks(header: Any) -> bool:
     """Whether points are packed in chunks of different sizes, as in COPC: lazrs then finds wrong points when it seeks."""
     import lazrs
 
-    packed = [vlr.record_data_bytes() for vlr in header.vlrs if vlr.record_id == LASZIP]
+    packed = [vlr.record_data_bytes() for vlr in header.vlrs if vlr.record_id == LASZIP_RECORD]
     return any(lazrs.LazVlr(described).uses_variable_size_chunks() for described in packed)
 
 
