@@ -9,6 +9,7 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
+from marks import compiled_only
 from shapes import make
 from typed import known
 
@@ -333,3 +334,25 @@ def test_a_length_is_found_that_passes_only_far_above_one_that_loses_limbs(monke
     counted_runs(monkeypatch, lambda length: length > 1.8 * usual)
     advice = Advice(cloud, st.Settings(length=1.0))
     assert advice.suggest() > 1.8 * usual and advice.passes
+
+
+def thin_bowl(count: int = 40_000, radius: float = 60.0, wall: float = 6.0) -> np.ndarray:
+    """A half sphere that is a thin solid, with a flat lip."""
+    rng = np.random.default_rng(3)
+    inner = radius - wall
+    shares = np.array([2 * radius**2, 2 * inner**2, radius**2 - inner**2])
+    part = rng.choice(3, count, p=shares / shares.sum())
+    turn, down = rng.uniform(0, 2 * np.pi, count), rng.uniform(0, 1, count)
+    size = np.where(part == 0, radius, np.where(part == 1, inner, np.sqrt(rng.uniform(inner**2, radius**2, count))))
+    down = np.where(part == 2, 0.0, down)
+    flat = size * np.sqrt(1 - down**2)
+    return np.column_stack([flat * np.cos(turn), flat * np.sin(turn), -size * down]) + rng.normal(0, 0.05, (count, 3))
+
+
+@compiled_only
+def test_a_thin_solid_gets_a_length_that_keeps_both_of_its_sides() -> None:
+    advice = Advice(st.PointCloud.from_array(thin_bowl()), st.Settings(length=1.0))
+    length = advice.suggest()
+    trial = advice.try_length(length)
+    assert trial is not None and trial.grid is not None and length < 6.0
+    assert trial.grid.topology.euler == 2 and trial.lost < 0.01

@@ -18,6 +18,7 @@ from ..errors import FrontError, LengthError, LinesError, OneSidedError
 from ..pipeline import first_that_passes
 from ..scan.member_length import exact_range, length_range, round_length, suggest_length
 from ..surface.samples import sample_surface
+from ..surface.shape import wall_of_surface
 from ..surface.size_field import measured_bends
 
 if TYPE_CHECKING:
@@ -48,6 +49,9 @@ SAME_LENGTH = 1.03  # ratio of lengths up to which what has come of one stands f
 NEARBY_LENGTHS = (1.12, 0.9, 1.25, 0.8, 1.4, 0.7, 1.7, 0.6, 2.0, 0.5, 2.8)
 # spacings in a member from which holes in the sampling are seldom taken for holes of the surface
 SURE_PER_SPACING = 8.0
+LENGTH_OF_WALL = 0.8  # of the thickness of a wall: at 1.4 times that, too, both of its sides are kept apart
+MOSTLY_WALL = 0.4  # share of a scan on a thin wall from which on lengths are chosen for that
+LEAST_OF_WALL = 5.0  # least length for a wall, in spacings
 MOST_LOST = 0.01  # share of the scan that may be lost at a length that is suggested
 MOST_TRIED = 20.0  # grids that are made for a suggestion, or to find a length nearby, each counted by its cost
 POINTS_LOOKED_AT = 2_000_000  # points that are looked at for that
@@ -270,9 +274,19 @@ class Advice:
     def _ladder(self) -> Iterator[tuple[float, int]]:
         """Yield the lengths to try in turn, as multiples of the usual one, with how many grids are made of each."""
         yield 1.0, A_FEW
+        if (wall := self._length_of_wall()) is not None:
+            yield wall / self._usual, SOME_MORE
         usual = self._tried_usual()
         ladder = SHORTER_FIRST if usual is not None and (usual.passed or usual.leaves_out) else LONGER_FIRST
         yield from sorted(ladder, key=lambda step: step[1]) if self._loses_limbs() else ladder
+
+    def _length_of_wall(self) -> float | None:
+        """Return the length that keeps both sides of a thin wall apart, as of a bowl; None where there is none, or too few points."""
+        half = max(0.5 * self._usual, length_range(self._cloud)[0])
+        samples = sample_surface(self._cloud, self._settings.replace(length=half))
+        thickness, share = wall_of_surface(samples, self._usual)
+        length = LENGTH_OF_WALL * thickness
+        return length if share >= MOSTLY_WALL and length >= LEAST_OF_WALL * self._cloud.spacing else None
 
     def _tried_usual(self) -> LengthTrial | None:
         """Return what came of the usual length, or of that tried which is nearest to it."""

@@ -28,6 +28,8 @@ FEWEST_SAMPLES_AROUND_PLACE = 30  # samples within a member below which all that
 NEAREST_COUNTED = 16  # points around a place that always count
 LAYER_REACH = 0.7  # radius within which two layers are looked for [member lengths]
 CLOSE_LAYERS = 0.5  # distance below which a grid sees two layers as one [member lengths]
+PLACES_OF_WALL = 200  # places of a scan at which the other side of a wall is looked for
+BEHIND = 0.7  # cosine: the other side faces away, and lies behind
 EACH_LAYER = 0.2  # least share of the points in each of two layers
 LAYER_DISTANCE = 4.0  # least distance between two layers [rms thickness of the thicker one]
 # share of the places with two layers from which on they are reported where they have become one by smoothing
@@ -122,6 +124,28 @@ def layers_of_surface(samples: SurfaceSamples) -> tuple[float, float]:
             apart.append(distance)
     share = len(apart) / max(looked, 1)
     return (float(np.median(apart)), share) if share >= (SOME_LAYERS if samples.moved else MANY_LAYERS) else (0.0, 0.0)
+
+
+def wall_of_surface(samples: SurfaceSamples, reach: float) -> tuple[float, float]:
+    """Return how thick the wall of a scan is that has both of its sides, as of a bowl, and the share of places at which there is one.
+
+    Parameters
+    ----------
+    samples : SurfaceSamples
+    reach : float
+        A wall is not thicker than this [scan unit].
+    """
+    mean, normals = samples.surface.mean, samples.surface.normals
+    apart = []
+    places = np.unique(np.linspace(0, len(mean) - 1, PLACES_OF_WALL).astype(np.int64))
+    for sample in places:
+        away = mean - mean[sample]
+        squares = (away**2).sum(axis=1)
+        facing, depth = normals @ normals[sample], -(away @ normals[sample])
+        other = (squares <= reach**2) & (facing < -BEHIND) & (depth > BEHIND * np.sqrt(squares))
+        if other.any():
+            apart.append(float(np.sqrt(squares[other].min())))
+    return (float(np.median(apart)) if apart else 0.0, len(apart) / len(places))
 
 
 def _layer_distance(points: np.ndarray) -> float:
