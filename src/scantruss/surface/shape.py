@@ -29,7 +29,7 @@ NEAREST_COUNTED = 16  # points around a place that always count
 LAYER_REACH = 0.7  # radius within which two layers are looked for [member lengths]
 CLOSE_LAYERS = 0.5  # distance below which a grid sees two layers as one [member lengths]
 PLACES_OF_WALL = 200  # places of a scan at which the other side of a wall is looked for
-OTHER_SIDE = 0.7  # cosine: the other side faces away, and lies behind
+FACES_AWAY_BY = 0.7  # cosine: the other side faces away, and lies behind
 EACH_LAYER = 0.2  # least share of the points in each of two layers
 LAYER_DISTANCE = 4.0  # least distance between two layers [rms thickness of the thicker one]
 # share of the places with two layers from which on they are reported where they have become one by smoothing
@@ -142,7 +142,7 @@ def wall_of_surface(samples: SurfaceSamples, reach: float) -> tuple[float, float
         away = mean - mean[sample]
         squares = (away**2).sum(axis=1)
         facing, depth = normals @ normals[sample], -(away @ normals[sample])
-        other = (squares <= reach**2) & (facing < -OTHER_SIDE) & (depth > OTHER_SIDE * np.sqrt(squares))
+        other = (squares <= reach**2) & (facing < -FACES_AWAY_BY) & (depth > FACES_AWAY_BY * np.sqrt(squares))
         if other.any():
             apart.append(float(np.sqrt(squares[other].min())))
     return (float(np.median(apart)) if apart else 0.0, len(apart) / len(places))
