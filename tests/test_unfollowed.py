@@ -195,3 +195,17 @@ def lobed(rng: np.random.Generator, lobes: int, depth: float) -> np.ndarray:
     way /= np.linalg.norm(way, axis=1)[:, None]
     turn, level = np.arctan2(way[:, 1], way[:, 0]), np.hypot(way[:, 0], way[:, 1])
     return np.asarray(way * (1.0 + depth * np.cos(lobes * turn) * level**2)[:, None])
+
+
+@compiled_only
+@pytest.mark.parametrize(("length", "fails"), [(0.28, True), (0.8, False)])
+def test_a_grid_whose_nodes_jump_between_two_layers_is_refused(length: float, fails: bool) -> None:
+    rng = np.random.default_rng(7)
+    x, y = rng.uniform([-5.0, -3.5], [5.0, 3.5], (15_000, 2)).T
+    layer = 0.11 * rng.integers(0, 2, 15_000)
+    points = np.column_stack([x, y, 3.0 - 0.01 * x**2 - 0.01 * y**2 + layer + rng.normal(0.0, 0.004, 15_000)])
+    if fails:
+        with pytest.raises(st.CertificateError, match=r"rounds off [23]\d% of the points"):
+            grid_from_points(points, st.Settings(length=length, effort="quick"))
+    else:
+        assert known(grid_from_points(points, st.Settings(length=length, effort="quick")).certificate).passed

@@ -26,7 +26,7 @@ from .gaps import bridged_gaps, openings_closed
 from .hanging import hanging_nodes, nodes_off_sheets
 from .irregular import count_irregular
 from .left_out import closed_holes, first_and_more, parts_left_out
-from .limits import NOISES_OFF, ROUNDED_BY, limits_of, places_to_look_at, widened_limits
+from .limits import NOISES_OFF, ROUNDED_BY, limits_of, mostly_rounded, places_to_look_at, widened_limits
 from .sheets import cut_apart, faults_on_sheets, nodes_of_samples
 from .slits import feet_on, narrow_gaps
 from .sparse import sparse_parts
@@ -130,6 +130,7 @@ class Judged:
                 *beyond,
                 *bare,
                 *(each for each in bridged if each.kind == "bridged"),
+                *mostly_rounded(rounded, missed_at),
             ),
             warnings=(
                 *self.certificate.warnings,
@@ -216,7 +217,7 @@ def _way_out(found: Certificate) -> str:
     kinds = {fault.kind for fault in found.faults}
     if kinds == {"cover"} and found.missing > MOST_ACCEPTED:
         return "choose the part that is wanted with --crop or --piece; --keep-failed gives it all the same"
-    if kinds == {"unfollowed"}:
+    if kinds <= {"unfollowed", "rounded"}:
         return "shorter members follow it; --keep-failed gives it all the same"
     if kinds == {"sparse"}:
         return "longer members cover it, --allow-missing accepts more of the scan missing"

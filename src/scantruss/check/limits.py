@@ -28,6 +28,8 @@ WARN_OFFSET = 0.05  # distance of a node from the scan, beyond its noise, from w
 NOISES_OFF = 3.0  # rms distances of points from their plane that are noise
 PLACES_KEPT = 30  # places of a fault that are kept, the worst first
 ROUNDED_BY = 0.25  # distance from the grid above which a point is rounded off [member lengths]
+# share of the points that are rounded off above which it is a fault: 0.23 where nodes jump between two layers, 0.16 at most on others
+MOST_ROUNDED = 0.2
 # share of the points that a grid may miss or round off, and ScanTruss may leave out by itself, without a word
 WARN_LEFT_OUT = 0.01
 
@@ -115,6 +117,13 @@ def _inner_angles(grid: Grid) -> np.ndarray:
     return angles
 
 
+def mostly_rounded(rounded: float, at: Place) -> list[Fault]:
+    """Return a fault where a grid rounds off too much of its scan; parameters as of `places_to_look_at`."""
+    if rounded <= MOST_ROUNDED:
+        return []
+    return [Fault("rounded", f"rounds off {rounded:.0%} of the points by more than a quarter of a member", at)]
+
+
 def places_to_look_at(found: Certificate, missed_at: Place, rounded: float = 0.0) -> list[Fault]:
     """Return warnings of what a grid leaves out: each place farther than a member, and much that it misses or ScanTruss left out.
 
@@ -130,7 +139,7 @@ def places_to_look_at(found: Certificate, missed_at: Place, rounded: float = 0.0
     if found.missing > WARN_LEFT_OUT:
         words = f"misses {found.missing:.1%} of the points by more than half a member"
         warnings.append(Fault("missed", words, missed_at))
-    if rounded > WARN_LEFT_OUT:
+    if WARN_LEFT_OUT < rounded <= MOST_ROUNDED:
         words = (
             f"rounds off {rounded:.0%} of the points by more than a quarter of a member; shorter members follow them"
         )

@@ -25,8 +25,8 @@ class Fault:
     """What is wrong with a grid; "the grid " and `words` make a sentence."""
 
     #: empty manifold orientable pieces loops crossing folded uneven cover torn astray fixed beyond bridged; angle
-    #: short long offset unfollowed as fault or warning; of a warning aside, far, left out, gap, closed, hole, zigzag, cut,
-    #: missed, rounded, peak, apart, ridge
+    #: short long offset unfollowed rounded as fault or warning; of a warning aside, far, left out, gap, closed, hole, zigzag,
+    #: cut, missed, peak, apart, ridge
     kind: str
     words: str
     where: Place | None = None  #: a place in the scan's own frame [scan unit], the worst
