@@ -210,9 +210,9 @@ def test_what_a_grid_of_the_mean_surface_rounds_off_is_said_as_far_as_it_is_no_r
     rough = sheet(13, 8, 0.08)
     rough[:, 2] += np.random.default_rng(4).choice([-0.28, 0.28], len(rough))
     samples, grid = scanned(rough, lattice())
-    assert "rounded" in {warning.kind for warning in certify(grid, samples, NOTHING, SETTINGS).warnings}
-    smooth = replace(samples, moved=1.0)
-    assert "rounded" not in {warning.kind for warning in certify(grid, smooth, NOTHING, SETTINGS).warnings}
+    assert "rounded" in {fault.kind for fault in certify(grid, samples, NOTHING, SETTINGS).faults}  # all points
+    smooth = certify(grid, replace(samples, moved=1.0), NOTHING, SETTINGS)
+    assert "rounded" not in {each.kind for each in (*smooth.faults, *smooth.warnings)}
 
 
 def bounded(grid: st.Grid) -> Boundary:
