@@ -80,8 +80,8 @@ def convert(values: Namespace) -> None:
     claim_models(outs, taken, force=values.force)
     with Bars() as bars, SaveTogether("" if values.force else "result") as save:
         bars("read", 0.0)
-        model = read_model(values.source, values.merge)
         check_drawing_passed(values.source, values.keep_failed)
+        model = read_model(values.source, values.merge)
         for note in model.notes:
             bars.note(note)
         if values.unit is not None:

@@ -47,8 +47,8 @@ def read_saved_grid(path: str, merge: float | None, keep_failed: bool, bars: Bar
 
     if (row := FORMATS.get(suffix_of(Path(path), FORMATS))) is None or row.draw is None:
         return read_grid(path)
-    model = read_model(path, merge)
     check_drawing_passed(path, keep_failed)
+    model = read_model(path, merge)
     for note in model.notes:
         bars.note(note) if bars else print_lines([note])
     assert model.grid is not None  # drawings are no structures
@@ -68,7 +68,7 @@ def read_grid_or_structure(
 
 
 def check_drawing_passed(path: str, keep_failed: bool) -> None:
-    """Refuse an OBJ or PLY of a grid that failed its certificate, as its first lines say.
+    """Refuse an OBJ or PLY of a grid that failed its certificate, as its first lines say; what is no file is refused elsewhere.
 
     Raises
     ------
@@ -78,8 +78,10 @@ def check_drawing_passed(path: str, keep_failed: bool) -> None:
     from ..errors import CertificateError
     from ..export.obj import FAILED_LINE
 
+    if keep_failed or not Path(path).is_file():
+        return
     with Path(path).open("rb") as file:
         first = file.read(BYTES_OF_COMMENTS).decode("latin-1").splitlines()
-    if not keep_failed and (said := next((line for line in first if FAILED_LINE in line), "")):
+    if said := next((line for line in first if FAILED_LINE in line), ""):
         words = said.partition(FAILED_LINE)[2]
         raise CertificateError(f"{path} is of a grid that {FAILED_LINE}{words}; --keep-failed uses it anyway")
