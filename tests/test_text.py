@@ -46,6 +46,15 @@ def rows(separator: str, before: int = 0, after: int = 0, form: str = "%.3f") ->
     return lines
 
 
+@pytest.mark.parametrize("separator", [";", "\t", " "])
+def test_two_numbers_with_decimal_commas_are_no_point(tmp_path: Path, separator: str) -> None:
+    """They were read as x, y and z of 6, 1973 and 1."""
+    rows = [f"{x / 7:.4f}{separator}{x / 3:.4f}".replace(".", ",") for x in range(-30, 30)]
+    (tmp_path / "plan.csv").write_text("\n".join([f"x{separator}y", *rows]) + "\n")
+    with pytest.raises(FormatError, match=r"two numbers in a line .*; points need x, y and z"):
+        read_points(tmp_path / "plan.csv")
+
+
 @pytest.mark.parametrize(
     "line", ["{0:,.3f};{1:,.3f};{2:,.3f}", '"{0:,.3f}","{1:,.3f}","{2:,.3f}"', "{0:,.3f}  {1:,.3f}  {2:,.3f}"]
 )

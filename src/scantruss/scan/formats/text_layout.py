@@ -79,6 +79,7 @@ def find_layout(path: Path, wanted: Sequence[str] = ()) -> Layout:
     separator, comma = _find_grammar(rows)
     if separator == ANY_SEPARATOR:
         _check_not_grouped(path, rows)
+        _check_not_two_columns(path, rows)
     if (separator, comma) == (",", True):
         _check_not_thousands(path, rows)
     if (separator, comma) == (",", False):
@@ -155,6 +156,17 @@ def _check_not_grouped(path: Path, rows: Sequence[str]) -> None:
                 raise FormatError(
                     f"{path} has numbers with a sign between thousands ({grouped[0]}); export it without one"
                 )
+
+
+def _check_not_two_columns(path: Path, rows: Sequence[str]) -> None:
+    """Refuse 6,1973;1,8543: two numbers with decimal commas, which would be split in four."""
+    for separator in (";", "|", "\t", None):
+        split = [split_line(row, separator) for row in rows]
+        two = [row for row in split if len(row) == 2 and all("," in field and is_number(field, True) for field in row)]
+        if 2 * len(two) > len(rows):
+            raise FormatError(
+                f"{path} has two numbers in a line ({' and '.join(two[0])}, with decimal commas); points need x, y and z"
+            )
 
 
 def _check_not_thousands(path: Path, rows: Sequence[str]) -> None:
