@@ -356,3 +356,15 @@ def test_a_thin_solid_gets_a_length_that_keeps_both_of_its_sides() -> None:
     trial = advice.try_length(length)
     assert trial is not None and trial.grid is not None and length < 6.0
     assert trial.grid.topology.euler == 2 and trial.lost < 0.01
+
+
+def test_a_length_nearby_that_a_fixed_position_does_not_suit_is_passed_over() -> None:
+    """Of shorter lengths the position was farther off than half a member, and that was said in place of why the first failed."""
+    points = np.random.default_rng(4).uniform([-5.0, -4.0, 0.0], [5.0, 4.0, 0.01], (8_000, 3))
+    settings = st.Settings(length=1.0, fixed=((0.0, 0.0, 0.49),))
+    advice = Advice(st.PointCloud.from_array(points), settings)
+    advice.nearby(1.0)
+    shorter = [trial for trial in advice.tried if trial.length < 0.97]
+    assert shorter and not any(trial.passed for trial in shorter)
+    with pytest.raises(st.InputError, match="away from the scan"):
+        Advice(st.PointCloud.from_array(points), settings).try_length(0.9)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..attempts import AttemptLimit, attempts
-from ..errors import FrontError, LengthError, LinesError, OneSidedError
+from ..errors import FrontError, InputError, LengthError, LinesError, OneSidedError
 from ..pipeline import first_that_passes
 from ..scan.member_length import exact_range, length_range, round_length, suggest_length
 from ..surface.samples import sample_surface
@@ -115,6 +115,7 @@ class Advice:
     def __init__(self, cloud: PointCloud, settings: Settings, progress: Progress | None = None) -> None:
         self._cloud, self._progress = cloud, progress
         self._settings = settings.replace(effort="quick", length_field="")
+        self._is_nearby = False  #: whether a length in place of one that the settings suit is looked for
         self._found: dict[float, LengthTrial] = {}
         self._begun: dict[
             float, tuple[Settings, Iterator[Attempt], AttemptLimit]
@@ -194,7 +195,9 @@ class Advice:
                 sharp_edges=made.sharp_edges,
                 plain_body=made.plain_body,
             )
-        except (FrontError, LengthError, LinesError, OneSidedError) as error:
+        except (FrontError, InputError) as error:
+            if not isinstance(error, (FrontError, LengthError, LinesError, OneSidedError)) and not self._is_nearby:
+                raise  # a setting that suits no length
             fault = fault or (error if isinstance(error, FrontError) else FrontError(str(error)))
         self._left -= cost * (limit.runs - before)
         paused = limit.is_paused() and limit.runs > before
@@ -306,6 +309,7 @@ class Advice:
 
         For a length far too short the usual one is tried alone.
         """
+        self._is_nearby = True
         low, high = length_range(self._cloud)
         if length < FAR_TOO_SHORT * low:
             return self._usual_if_it_passes()
