@@ -114,7 +114,7 @@ class Settings(
     def check_for_array(self) -> None:
         """Refuse settings that choose what is read of a scan file: an array is taken whole."""
         for name in (*(spec.name for spec in fields(Selection)), "thin_spacing"):
-            if getattr(self, name) != next(spec.default for spec in fields(self) if spec.name == name):
+            if name in self.chosen:
                 raise InputError(
                     f"{name} acts while a scan file is read, and an array is taken whole; cut the array or use grid_from_scan"
                 )
