@@ -15,7 +15,7 @@ from typed import known
 
 import scantruss as st
 from scantruss import pipeline
-from scantruss.attempts import Attempt
+from scantruss.attempts.table import Attempt
 from scantruss.cli.main import main
 from scantruss.report.advice import LEAST_TRIED, MOST_TRIED, SURE_PER_SPACING, TRIED_AROUND, Advice, LengthTrial
 from scantruss.report.lengths import advice_lines, advice_rows
@@ -110,7 +110,7 @@ def test_a_refused_length_comes_with_one_that_passes(
         return judge(grid, samples, boundary, settings)
 
     monkeypatch.setattr("scantruss.improve.candidate.judge", fails_there)
-    monkeypatch.setattr("scantruss.attempts.MOST_RUNS", 3)  # there is no use in more where all fail
+    monkeypatch.setattr("scantruss.attempts.limit.MOST_RUNS", 3)  # there is no use in more where all fail
     words = ["grid", "limpet.xyz", "a.json", "--effort", "quick", "--length"]
     assert main([*words, str(failing)]) == 2
     said = capsys.readouterr().err

@@ -17,7 +17,8 @@ from typed import known
 
 import scantruss as st
 from scantruss import candidates, pipeline
-from scantruss.attempts import FRONT_LENGTHS, MOST_RUNS, SMOOTHED, Attempt, AttemptLimit, attempts
+from scantruss.attempts.limit import MOST_RUNS, AttemptLimit
+from scantruss.attempts.table import FRONT_LENGTHS, SMOOTHED, Attempt, attempts
 from scantruss.check.certify import Judged, judge
 from scantruss.errors import CertificateError, FrontError
 from scantruss.improve.optimize import improve_last
@@ -128,7 +129,9 @@ def test_more_effort_never_gives_less(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_no_more_grids_are_made_than_the_law_says(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(pipeline, "attempts", lambda cloud, settings: (Attempt(settings) for _ in range(1000)))
+    monkeypatch.setattr(
+        "scantruss.attempts.course.attempts", lambda cloud, settings: (Attempt(settings) for _ in range(1000))
+    )
     begun = refusing(monkeypatch, lambda _: False)
     with pytest.raises(FrontError, match="fault 1"):
         st.grid_from_points(cap(4.0, 1.0, 0.25), st.Settings(length=1.0))

@@ -293,7 +293,7 @@ def test_a_failed_grid_is_kept_where_that_is_asked_for(
     plate: np.ndarray, monkeypatch: pytest.MonkeyPatch, effort: str
 ) -> None:
     monkeypatch.setattr("scantruss.check.defects.UNEVEN_LENGTHS", -1.0)  # no grid can pass
-    monkeypatch.setattr("scantruss.attempts.MOST_RUNS", 2)
+    monkeypatch.setattr("scantruss.attempts.limit.MOST_RUNS", 2)
     settings = st.Settings(length=1.5, effort=effort)
     with pytest.raises(CertificateError) as refused:
         st.grid_from_points(plate, settings)

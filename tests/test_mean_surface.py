@@ -7,7 +7,7 @@ from small_clouds import cap, sheet
 from typed import known
 
 import scantruss as st
-from scantruss.attempts import attempts
+from scantruss.attempts.table import attempts
 from scantruss.check.distances import offsets_from_points
 from scantruss.kernels.geometry.boxes import new_boxes
 from scantruss.kernels.geometry.quadric import TERMS_OF_PLANE, TERMS_OF_QUADRIC

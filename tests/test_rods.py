@@ -12,7 +12,7 @@ import pytest
 from typed import known
 
 import scantruss as st
-from scantruss.attempts import attempts
+from scantruss.attempts.table import attempts
 from scantruss.check.distances import boxes_of
 from scantruss.check.gaps import openings_closed
 from scantruss.cli.main import main

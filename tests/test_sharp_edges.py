@@ -8,7 +8,7 @@ from marks import compiled_only
 from numpy.typing import NDArray
 
 import scantruss as st
-from scantruss.attempts import attempts
+from scantruss.attempts.table import attempts
 from scantruss.surface.samples import sample_surface
 
 LENGTH = 1.0

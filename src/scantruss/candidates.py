@@ -7,7 +7,7 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from .attempts import VERY_ROUGH_SCAN
+from .attempts.looks import VERY_ROUGH_SCAN
 from .errors import FrontError
 from .front.advance import advance_front
 from .front.orientation_field import Field, orientation_fields

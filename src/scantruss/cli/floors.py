@@ -19,7 +19,7 @@ RUNS_OF_CROP = 4  # grids that are made to try it
 
 def words_of_floor(bars: Bars, cloud: PointCloud, settings: Settings) -> str:
     """Name the crop without the level floor of a scan with which a grid passes, tried by quick runs; nothing if none does."""
-    from ..attempts import AttemptLimit, attempts
+    from ..attempts.limit import AttemptLimit
     from ..pipeline import first_that_passes
     from ..scan.cloud import PointCloud
     from ..surface.samples import sample_surface
@@ -44,7 +44,7 @@ def words_of_floor(bars: Bars, cloud: PointCloud, settings: Settings) -> str:
         tried = settings.replace(effort="quick")
         part, limit = PointCloud.from_array(places[inside], unit=cloud.unit), AttemptLimit()
         limit.allow(RUNS_OF_CROP)
-        first_that_passes(part, tried, attempts(part, tried), limit=limit, progress=bars)
+        first_that_passes(part, tried, limit=limit, progress=bars)
     except ScanTrussError:
         return ""
     at = f"{words_of_number(floor + float(cloud.origin[2]), 3)}{unit_words(cloud.unit)}"

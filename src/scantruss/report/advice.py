@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..attempts import AttemptLimit, attempts
+from ..attempts.limit import AttemptLimit
+from ..attempts.table import attempts
 from ..errors import FrontError, InputError, LengthError, LinesError, OneSidedError
 from ..pipeline import first_that_passes
 from ..scan.member_length import exact_range, length_range, round_length, suggest_length
@@ -22,7 +23,7 @@ from ..surface.shape import wall_of_surface
 from ..surface.size_field import measured_bends
 
 if TYPE_CHECKING:
-    from ..attempts import Attempt
+    from ..attempts.table import Attempt
     from ..grid.grid import Grid
     from ..runtime.progress import Progress
     from ..scan.cloud import PointCloud

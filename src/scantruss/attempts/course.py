@@ -1,0 +1,170 @@
+"""The course of the attempts at one grid: which comes next, and what has come of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from ..check.limits import with_ridges_given_up
+from ..errors import CertificateError, FrontError, OneSidedError, ScanTrussError
+from .limit import AttemptLimit, joins_sheets, only_leaves_out
+from .looks import runs_along_rods
+from .table import attempts
+
+if TYPE_CHECKING:
+    from ..grid.grid import Grid
+    from ..scan.cloud import PointCloud
+    from ..settings import Settings
+    from .table import Attempt
+
+LEAST_EFFORT = "quick"
+WITHOUT_RODS = "passes, but along rods: without them"
+RIDGES_GIVEN_UP = "ridges given up near the faults"
+
+
+class AttemptCourse:
+    """The attempts in their turn, and what follows from what came of them.
+
+    What follows is put in next, each by one law:
+
+    - `RIDGES_GIVEN_UP`: an attempt fails near ridges; each gives up one place more at least, of `FAULTS_WITHOUT_RIDGES`.
+    - `WITHOUT_RODS`: a grid passes but runs along rods; once, as the last attempt. That with fewer warnings is taken.
+    - least effort: none passes, and sheets are not too near each other; all attempts again, once: more effort never gives less.
+
+    Parameters
+    ----------
+    cloud : PointCloud
+    settings : Settings
+        Those that were asked for.
+    tried : iterable of Attempt, optional
+        The attempts in their order, where it is not the table from its begin; they may be what an earlier course has left.
+    limit : AttemptLimit, optional
+        How many are worth making.
+    """
+
+    def __init__(
+        self,
+        cloud: PointCloud,
+        settings: Settings,
+        tried: Iterable[Attempt] | None = None,
+        limit: AttemptLimit | None = None,
+    ) -> None:
+        self._cloud = cloud
+        self._refused: FrontError | None = None  # fault of the effort asked for, where the least is tried
+        self._begin(settings, attempts(cloud, settings) if tried is None else tried, limit or AttemptLimit())
+
+    def _begin(self, settings: Settings, tried: Iterable[Attempt], limit: AttemptLimit) -> None:
+        self._settings, self._tried, self._limit = settings, iter(tried), limit
+        self._faults: list[ScanTrussError] = []  # of attempts with the settings asked for
+        self._advice = ""
+        self._follows: Attempt | None = None  # what is put in next
+        self._row_begun: Attempt | None = None  # the attempt of the table that those put in follow
+        self._first_fault: FrontError | None = None  # of that attempt
+        self._passed: Grid | None = None
+
+    def __iter__(self) -> Iterator[Attempt]:
+        """Yield each attempt, once what came of the one before was told by `passed` or `failed`."""
+        # ends: the list ends, a place of ridges is given up once, rods are left out once, the effort is lowered once
+        while attempt := self._next():
+            self._limit.begin()
+            yield attempt
+
+    def _next(self) -> Attempt | None:
+        """Return the attempt that comes next; None at the end."""
+        if self._follows is not None:
+            follows, self._follows = self._follows, None
+            return follows
+        if self._passed is not None:
+            return None
+        attempt = self._next_listed()
+        if attempt is None and self._tries_least_effort():
+            settings = self._settings.replace(effort=LEAST_EFFORT)
+            self._begin(settings, attempts(self._cloud, settings), AttemptLimit())
+            attempt = self._next_listed()
+        return attempt
+
+    def _next_listed(self) -> Attempt | None:
+        """Return the next attempt of the list that is worth making."""
+        if not self._limit.any_left():
+            return None
+        attempt = next(filter(self._limit.allows, self._tried), None)
+        self._row_begun, self._first_fault = attempt, None
+        return attempt
+
+    def _tries_least_effort(self) -> bool:
+        """Whether all attempts are made once more; where they are, what refuses the grid is noted."""
+        fault = self._fault()
+        if self._settings.effort == LEAST_EFFORT or not isinstance(fault, FrontError) or joins_sheets(fault):
+            return False
+        self._refused = fault
+        return True
+
+    def passed(self, attempt: Attempt, grid: Grid) -> None:
+        """Note that a grid passes the checks."""
+        grid = with_ridges_given_up(grid, attempt.faults)
+        if self._passed is not None:  # this one is without rods
+            assert grid.certificate is not None and self._passed.certificate is not None
+            fewer = len(grid.certificate.warnings) < len(self._passed.certificate.warnings)
+            self._passed = grid if fewer else self._passed
+            return
+        if runs_along_rods(grid, self._cloud, attempt.settings):
+            assert self._row_begun is not None
+            without = self._row_begun.settings.replace(keep_rods=False)
+            self._follows = replace(self._row_begun, settings=without, row=WITHOUT_RODS)
+            self._first_fault = None
+        self._passed = grid
+
+    def failed(self, attempt: Attempt, fault: ScanTrussError) -> None:
+        """Note that an attempt gives no grid that passes.
+
+        Raises
+        ------
+        ScanTrussError
+            The fault, where it is one of the settings that were asked for.
+        """
+        if isinstance(fault, FrontError):
+            self._limit.end(fault)
+            self._first_fault = self._first_fault or fault
+            later = attempt.after(fault, self._cloud) if self._limit.any_left() else None
+            if later is not None:
+                self._follows = replace(later, row=RIDGES_GIVEN_UP)
+                return
+            fault = self._first_fault
+        if self._passed is None and self._row_begun is not None:
+            self._note(self._row_begun, fault)
+
+    def _note(self, attempt: Attempt, fault: ScanTrussError) -> None:
+        """Note why no grid of an attempt of the table passes, whatever followed it."""
+        looks_one_sided = bool(self._faults) and isinstance(self._faults[0], OneSidedError)
+        if attempt.settings == self._settings:  # what goes wrong with other settings, nobody has asked for
+            if not isinstance(fault, FrontError | OneSidedError):
+                raise fault
+            self._faults.append(fault)
+        elif looks_one_sided and isinstance(fault, FrontError):  # where its mean surface does not
+            self._faults.append(fault)
+        self._advice = self._advice or attempt.advice(fault)
+        self._limit.note(attempt, fault)
+
+    def outcome(self) -> Grid:
+        """Return the grid that passes.
+
+        Raises
+        ------
+        ScanTrussError
+            None does; the fault with the effort asked for, of the first attempt with the settings asked for that gave a grid, else
+            of the first. It names the settings of a grid of the mean surface that only leaves out too much.
+        """
+        if self._passed is not None:
+            return self._passed
+        fault = self._fault()
+        raise (self._refused or fault) if isinstance(fault, FrontError) else fault
+
+    def _fault(self) -> ScanTrussError:
+        """Return why no grid passes with the effort that was tried last."""
+        if not self._faults:
+            return FrontError("none of the attempts made gives a grid that passes")
+        worst = next((fault for fault in self._faults if isinstance(fault, CertificateError)), self._faults[0])
+        if self._advice and isinstance(worst, FrontError) and not only_leaves_out(worst):
+            return type(worst)(f"{worst}; {self._advice}", worst.grid, worst.where)
+        return worst

@@ -1,0 +1,109 @@
+"""How many attempts are worth making."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, TypeGuard
+
+from ..check.crossings import MOST_CROSSINGS
+from ..errors import CertificateError, FrontError, OneSidedError, ScanTrussError
+
+if TYPE_CHECKING:
+    from ..settings import Settings
+    from .table import Attempt
+
+FAR_FROM_PASSING = 12  # cuts and missing boundary loops above which other fronts with the same samples do not help
+# share of the scan that a grid misses above which other fronts do not help either, in shares that may be missing; of thin limbs 1
+FAR_MISSING = 2.0
+MOST_RUNS = 24  # grids that are made at most, before a scan is refused
+MOST_RUNS_OF_CELLS = 3  # grids of quads or hexagons that are made at most; they are made of triangles that pass
+MOST_FAR, MOST_GIVEN_UP = 2, 3  # attempts in a row of the same settings that are so far from passing, and such settings
+# such attempts in a row for a body without thin limbs, which is so smooth that other fronts come no nearer
+MOST_FAR_OF_BODY = 1
+
+
+def only_leaves_out(fault: ScanTrussError) -> TypeGuard[CertificateError]:
+    """Whether a grid only leaves out too much of the scan."""
+    found = fault.grid.certificate if isinstance(fault, CertificateError) else None
+    return found is not None and {each.kind for each in found.faults} == {"cover"}
+
+
+def joins_sheets(fault: ScanTrussError | None) -> bool:
+    """Whether a grid cuts itself everywhere since it joins sheets of the scan that lie too near each other: no other look parts them.
+
+    It has fewer pieces than the scan, or falls into more where the sheets are one piece of the scan, and is no manifold.
+    """
+    found = fault.grid.certificate if isinstance(fault, CertificateError) else None
+    if found is None or found.crossings < MOST_CROSSINGS:
+        return False
+    return found.pieces < found.scan_pieces or (found.pieces > found.scan_pieces and not found.manifold)
+
+
+class AttemptLimit:
+    """Which attempts are still worth making.
+
+    After two in a row that come nowhere near a grid that passes, others of the same settings would come no nearer; after three
+    such settings none would. A scan that looks one-sided may only be rough: then its mean surface is not. How much is tried is
+    counted in grids that are made, not in seconds: the same scan gets the same result.
+    """
+
+    def __init__(self) -> None:
+        self._allowed = MOST_RUNS
+        self._far: list[tuple[Settings, int]] = []  # settings, and how many attempts in a row were far from passing
+        self._given_up = self._of_cells = 0
+        self.runs, self._looks_one_sided = 0, False  #: grids that were made
+
+    def allow(self, more: int) -> None:
+        """Pause after some more grids."""
+        self._allowed = min(MOST_RUNS, self.runs + more)
+
+    def any_left(self) -> bool:
+        """Whether any attempt is worth making, and allowed."""
+        return self._is_hopeful() and self.runs < self._allowed
+
+    def is_paused(self) -> bool:
+        """Whether attempts would be worth making that are not allowed."""
+        return self._is_hopeful() and self._allowed <= self.runs < MOST_RUNS
+
+    def _is_hopeful(self) -> bool:
+        """Whether any attempt is worth making."""
+        return self._given_up < MOST_GIVEN_UP and self._of_cells < MOST_RUNS_OF_CELLS
+
+    def begin(self) -> None:
+        """Note that a grid is made."""
+        self.runs += 1
+
+    def end(self, fault: FrontError) -> None:
+        """Note why a grid that was made does not pass."""
+        self._of_cells += fault.grid is not None and fault.grid.cells != "triangle"
+
+    def allows(self, attempt: Attempt) -> bool:
+        """Whether an attempt is worth making."""
+        if self._looks_one_sided and not attempt.settings.smooth_scale:
+            return False
+        return self._far_in_a_row(attempt.settings) < (MOST_FAR_OF_BODY if attempt.settings.plain_body else MOST_FAR)
+
+    def _far_in_a_row(self, settings: Settings) -> int:
+        """Return how many attempts of some settings, one after the other, were far from passing."""
+        return next((count for known, count in self._far if known == settings), 0)
+
+    def note(self, attempt: Attempt, fault: ScanTrussError) -> None:
+        """Note what has come of an attempt."""
+        self._looks_one_sided |= isinstance(fault, OneSidedError)
+        far = self._far_in_a_row(attempt.settings) + 1 if _is_far_from_passing(attempt, fault) else 0
+        self._far = [pair for pair in self._far if pair[0] != attempt.settings] + [(attempt.settings, far)]
+        self._given_up += far == MOST_FAR and not attempt.settings.smooth_scale  # of those there are four
+        if far == MOST_FAR and joins_sheets(fault):
+            self._given_up = MOST_GIVEN_UP
+
+
+def _is_far_from_passing(attempt: Attempt, fault: ScanTrussError) -> bool:
+    """Whether a grid misses many loops or much of the scan, or limbs as every front will, or many of its triangles cut each other."""
+    if isinstance(fault, OneSidedError):
+        return True
+    if not isinstance(fault, CertificateError) or fault.grid.certificate is None:
+        return False
+    found = fault.grid.certificate
+    limbs = sum(part.share for part in found.left_out if part.kind == "limbs")
+    if found.missing > FAR_MISSING * attempt.settings.allow_missing or limbs > attempt.settings.allow_missing:
+        return True
+    return found.crossings + abs(found.boundary_loops - found.scan_loops) > FAR_FROM_PASSING

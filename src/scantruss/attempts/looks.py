@@ -1,0 +1,154 @@
+"""What a scan shows that decides which attempts at its grid are made."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..constraints.ridges import find_ridges
+from ..surface.chosen_samples import ROD
+from ..surface.samples import sample_surface
+from ..surface.sharp_edges import EDGE_SHARE, FEWEST_NEEDED
+from ..surface.supports import are_columns
+
+if TYPE_CHECKING:
+    from ..grid.grid import Grid
+    from ..scan.cloud import PointCloud
+    from ..settings import Settings
+
+# shares of thick samples from which on a scan is rough, and so rough that its mean surface comes first
+ROUGH_SCAN, VERY_ROUGH_SCAN = 0.02, 0.25
+MANY_OUTLIERS = 0.002  # share of the points that must be outliers for a grid to be tried without them
+BESIDE_RODS = 0.5  # distance from a rod within which the place of a warning is beside it [member lengths]
+
+
+class AskedScan:
+    """A scan and the settings that were asked for it, with what they show; each is looked up when a row first asks.
+
+    Parameters
+    ----------
+    cloud : PointCloud
+    asked : Settings
+    """
+
+    def __init__(self, cloud: PointCloud, asked: Settings) -> None:
+        self.cloud, self.asked = cloud, asked
+
+    @property
+    def by_default(self) -> bool:
+        """Whether the method is not the paper's, which takes the scan as it is."""
+        return self.asked.method == "default"
+
+    @cached_property
+    def stands_on_rods(self) -> bool:
+        """Whether it is a hall: no other front would get around its columns."""
+        return self.asked.keep_rods and self.by_default and _stands_on_rods(self.cloud, self.asked)
+
+    @cached_property
+    def has_sharp_edges(self) -> bool:
+        """Whether sharp edges are worth a look that was not asked for."""
+        return self.by_default and not self.asked.sharp_edges and _has_sharp_edges(self.cloud, self.asked)
+
+    @cached_property
+    def has_plain_body(self) -> bool:
+        """Whether the scan is a body with thin limbs and slits, and one without them was not asked for."""
+        if not self.by_default or self.asked.plain_body or self.asked.sharp_edges:
+            return False
+        samples = sample_surface(self.cloud, self.asked.replace(plain_body=True))
+        return samples.measured < len(samples.surface.mean)
+
+    @cached_property
+    def has_limbs_cut_off(self) -> bool:
+        """Whether limbs are cut off."""
+        return len(sample_surface(self.cloud, self.asked).rings) > 0
+
+    @cached_property
+    def rough(self) -> float:
+        """Share of the samples that are thick; of a hall without its columns, as a mean surface of a shell and its scaffold is neither."""
+        seen = self.asked.replace(keep_rods=False) if self.stands_on_rods else self.asked
+        return float(sample_surface(self.cloud, seen).rough)
+
+    def can_be_smoothed(self, settings: Settings, scales: tuple[float, ...]) -> bool:
+        """Whether the settings leave open what is smoothed away, and over none of some scales two sheets would become one."""
+        return (
+            settings.method == "default"
+            and settings.smooth_scale is None
+            and not any(
+                sample_surface(self.cloud, settings.replace(smooth_scale=scale, ridge_angle=0.0)).layers[1] > 0.0
+                for scale in scales
+            )
+        )
+
+    def has_rods(self, settings: Settings) -> bool:
+        """Whether a part of the scan is too thin for a grid, as columns and scaffold are, but the scan does not stand on it."""
+        return settings.keep_rods and self.by_default and not self.stands_on_rods and _has_rods(self.cloud, settings)
+
+    def has_ridges(self, settings: Settings) -> bool:
+        """Whether the scan has ridges, and the settings follow them."""
+        if settings.ridge_angle <= 0.0 or not self.by_default:
+            return False
+        samples = sample_surface(self.cloud, settings)
+        return not samples.smooth and bool(find_ridges(samples, settings))
+
+    def has_more_outliers(self, settings: Settings) -> bool:
+        """Whether the scan has outliers that the settings leave in it."""
+        return settings.judge_outliers == "auto" and self.by_default and _has_more_outliers(self.cloud, settings)
+
+    def is_smooth(self, settings: Settings) -> bool:
+        """Whether the scan is so smooth that its samples lie farther apart than on others."""
+        return self.by_default and bool(sample_surface(self.cloud, settings).smooth)
+
+
+def runs_along_rods(grid: Grid, cloud: PointCloud, settings: Settings) -> bool:
+    """Whether a grid that passes leaves the boundary of its scan beside rods, as where its edge runs down a column."""
+    found = grid.certificate
+    if not settings.keep_rods or settings.method != "default" or found is None:
+        return False
+    places = [
+        place
+        for warning in found.warnings
+        if warning.kind == "aside"
+        for place in (warning.where, *warning.also)
+        if place is not None
+    ]
+    if not places:
+        return False
+    samples = sample_surface(cloud, settings.replace(keep_rods=False))
+    rods = samples.scan[samples.judged == ROD] + samples.origin
+    return bool(len(rods)) and any(
+        bool((np.linalg.norm(rods - place, axis=1) < BESIDE_RODS * settings.length).any()) for place in places
+    )
+
+
+def _has_more_outliers(cloud: PointCloud, settings: Settings) -> bool:
+    """Whether there are outliers that do not show where samples stand alone, as they are many or the members long."""
+    always = sample_surface(cloud, settings.replace(judge_outliers="always")).outliers
+    return always > MANY_OUTLIERS * len(cloud.points) and always > sample_surface(cloud, settings).outliers
+
+
+def _has_sharp_edges(cloud: PointCloud, settings: Settings) -> bool:
+    """Whether so many samples lie on sharp edges that these are to be looked at."""
+    on_edge = sample_surface(cloud, settings.replace(sharp_edges=True)).on_edge
+    return bool(on_edge.sum() >= max(FEWEST_NEEDED, EDGE_SHARE * len(on_edge)))
+
+
+def _has_rods(cloud: PointCloud, settings: Settings) -> bool:
+    """Whether a part of the scan is too thin for a grid, as columns and scaffold are.
+
+    Where limbs can be cut off, such parts are limbs too, and count as missing.
+    """
+    without = sample_surface(cloud, settings.replace(keep_rods=False))
+    return bool((without.judged == ROD).any()) and not sample_surface(cloud, settings).rings
+
+
+def _stands_on_rods(cloud: PointCloud, settings: Settings) -> bool:
+    """Whether the scan falls apart without such parts, as a hall does, or is rough for them alone, or they are columns of a shell."""
+    cut, without = sample_surface(cloud, settings), sample_surface(cloud, settings.replace(keep_rods=False))
+    if not (without.judged == ROD).any():
+        return False
+    parts = [len(each.pieces) + len(each.not_chosen) for each in (cut, without)]
+    if parts[1] > parts[0] or (cut.rough > VERY_ROUGH_SCAN and without.rough <= ROUGH_SCAN):
+        return True
+    return cloud.z_is_up and are_columns(without.scan[without.judged == ROD], without.surface.mean, settings.length)

@@ -1,0 +1,178 @@
+"""All attempts at a grid as one table: what is tried in which order, when, and what it changes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+from ..boundary.find import find_boundary
+from ..cells.make import settings_of_triangles
+from ..check.certify import MOST_ACCEPTED
+from ..constraints.find import ridges_away_from
+from ..front.orientation_field import FieldStart
+from ..settings import SAMPLE_SPACING
+from ..surface.samples import sample_surface
+from .limit import FAR_MISSING, only_leaves_out
+from .looks import ROUGH_SCAN, VERY_ROUGH_SCAN, AskedScan
+
+if TYPE_CHECKING:
+    from ..errors import FrontError, ScanTrussError
+    from ..scan.cloud import PointCloud
+    from ..settings import Settings
+
+AS_ASKED = "as asked"
+# lengths of the fronts without rows, in desired lengths, tried in turn where no other passes
+FRONT_LENGTHS = (1.0, 0.97, 1.04)
+COARSER_SAMPLES = (1.1, 1.2, 1.3)  # distances of the surface samples that are tried instead, in those of the settings
+COARSEST_SAMPLES = 0.5  # largest of them, in desired lengths
+SMOOTHED = (0.5, 1.0)  # scales over which a rough scan is smoothed where no grid passes without [member lengths]
+THINNER = (0.8, 0.0)  # girths below which limbs are cut off that are tried instead, in that of the settings
+FAULTS_WITHOUT_RIDGES = 6  # places at which ridges are given up, before they all are
+
+Starts = tuple[FieldStart, ...] | None  # how fronts are laid out; None: as the effort of the settings allows
+# which of the layouts of its fronts that a method has a row tries
+FIRST_LAYOUT, SECOND_LAYOUT, LATER_LAYOUTS = slice(0, 1), slice(1, 2), slice(2, None)
+FIRST_TWO_LAYOUTS, ALL_BUT_FIRST_LAYOUT, ALL_LAYOUTS = slice(0, 2), slice(1, None), slice(None)
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """One attempt at a grid."""
+
+    settings: Settings
+    starts: tuple[FieldStart, ...] | None = (
+        None  #: how its fronts are laid out; None: as the effort of the settings allows
+    )
+    faults: tuple[tuple[float, float, float], ...] = ()  #: places at which ridges are given up [scan unit]
+    is_trial: bool = False  #: whether all that counts is that a grid passes
+    row: str = AS_ASKED  #: name of its row in the table
+
+    def after(self, fault: FrontError, cloud: PointCloud) -> Attempt | None:
+        """The same attempt with the ridges given up where it failed; None where that is not known or no ridge is near."""
+        found = fault.grid.certificate if fault.grid is not None else None
+        places = [each.where for each in found.faults if each.where] if found is not None else []
+        places += [fault.where] if fault.where else []
+        new = tuple(dict.fromkeys(place for place in places if place not in self.faults))
+        follows = self.settings.ridge_angle > 0.0 and self.settings.method == "default" and self.starts is None
+        if not new or not follows or len(self.faults) >= FAULTS_WITHOUT_RIDGES:
+            return None
+        later = replace(self, faults=self.faults + new)
+        return later if later.ridge_points(cloud) < self.ridge_points(cloud) else None
+
+    def ridge_points(self, cloud: PointCloud) -> int:
+        """Return by how many points the ridges go that this attempt follows."""
+        settings = settings_of_triangles(self.settings)
+        samples, _ = find_boundary(sample_surface(cloud, settings), settings)
+        return sum(len(ridge.places) for ridge in ridges_away_from(self.faults, samples, settings))
+
+    def advice(self, fault: ScanTrussError) -> str:
+        """Say with which settings a grid passes that only leaves out too much: of the mean surface, or without thin limbs; else nothing."""
+        if not only_leaves_out(fault):
+            return ""
+        found = fault.grid.certificate
+        allowing = f"--allow-missing {math.ceil(100.0 * found.missing) / 100.0:g}"
+        if self.settings.smooth_scale and found.missing <= MOST_ACCEPTED:
+            smooth = f"--smooth-scale {self.settings.smooth_scale:g} --ridge-angle 0"
+            return f"with {smooth} {allowing} a grid of its mean surface passes"
+        if self.settings.plain_body and found.missing <= FAR_MISSING * self.settings.allow_missing:
+            return f"with --plain-body {allowing} a grid without its thin limbs passes"
+        return ""
+
+
+@dataclass(frozen=True)
+class AttemptRow:
+    """A row of the table: attempts that look at the scan in one way, each only where none before it passes."""
+
+    name: str
+    fronts: slice  #: which of the layouts of `layouts_of`
+    when: Callable[[AskedScan, Settings], bool] = lambda scan, now: True  #: whether it is made, by the settings so far
+    changes: Mapping[str, Any] = field(default_factory=dict)  #: settings, and what they become
+    shares: Mapping[str, float] = field(default_factory=dict)  #: settings, and what they are multiplied by
+    stays: bool = False  #: whether the rows after it keep what it changes
+
+    def changed(self, now: Settings) -> Settings:
+        """Return the settings of its attempts by the settings so far."""
+        scaled = {name: share * _size_of(now, name) for name, share in self.shares.items()}
+        return now.replace(**self.changes, **scaled) if self.changes or scaled else now
+
+
+def _size_of(settings: Settings, name: str) -> float:
+    """Return the size that a setting stands for."""
+    value: float | None = getattr(settings, name)
+    return value or SAMPLE_SPACING if name == "box_size" else float(value or 0.0)
+
+
+def _smoothed_rows(kind: str, when: Callable[[AskedScan], bool]) -> list[AttemptRow]:
+    """Return the rows that try the mean surface over each scale, where smaller ones join no two sheets either."""
+    return [
+        AttemptRow(
+            f"mean surface of a {kind} scan over {scale:g}",
+            FIRST_TWO_LAYOUTS,
+            lambda scan, now, scales=SMOOTHED[: number + 1]: when(scan) and scan.can_be_smoothed(now, scales),  # type: ignore[misc]
+            {"smooth_scale": scale, "ridge_angle": 0.0},
+        )
+        for number, scale in enumerate(SMOOTHED)
+    ]
+
+
+def _samples_fit(share: float) -> Callable[[AskedScan, Settings], bool]:
+    """Return whether samples so much farther apart are still fine enough for the members."""
+    return lambda scan, now: scan.by_default and share * _size_of(now, "box_size") <= COARSEST_SAMPLES
+
+
+ROWS_TRIED: tuple[AttemptRow, ...] = (
+    AttemptRow(AS_ASKED, FIRST_LAYOUT),
+    AttemptRow("hall without its columns", ALL_LAYOUTS, lambda scan, now: scan.stands_on_rods, {"keep_rods": False}),
+    AttemptRow("front without rows", SECOND_LAYOUT),
+    # where edges, limbs or slits are in the way, other fronts seldom help
+    AttemptRow("sharp edges", FIRST_LAYOUT, lambda scan, now: scan.has_sharp_edges, {"sharp_edges": True}),
+    AttemptRow("plain body", FIRST_LAYOUT, lambda scan, now: scan.has_plain_body, {"plain_body": True}),
+    AttemptRow("fronts of other lengths", LATER_LAYOUTS),
+    *(  # fewer limbs cut off, then none
+        AttemptRow(f"limbs at {share:g} girth", FIRST_LAYOUT, lambda scan, now: scan.has_limbs_cut_off, shares={"limb_girth": share})
+        for share in THINNER
+    ),
+    *_smoothed_rows("very rough", lambda scan: scan.rough > VERY_ROUGH_SCAN),  # so rough that hardly another passes
+    AttemptRow("sharp edges again", ALL_BUT_FIRST_LAYOUT, lambda scan, now: scan.has_sharp_edges, {"sharp_edges": True}, stays=True),
+    AttemptRow(
+        "plain body again", ALL_BUT_FIRST_LAYOUT, lambda scan, now: scan.has_plain_body, {"plain_body": True, "sharp_edges": False}
+    ),
+    AttemptRow("without rods", ALL_LAYOUTS, lambda scan, now: scan.has_rods(now), {"keep_rods": False}, stays=True),
+    AttemptRow("without ridges", ALL_LAYOUTS, lambda scan, now: scan.has_ridges(now), {"ridge_angle": 0.0}, stays=True),
+    AttemptRow("all outliers", ALL_LAYOUTS, lambda scan, now: scan.has_more_outliers(now), {"judge_outliers": "always"}, stays=True),
+    *_smoothed_rows("rough", lambda scan: ROUGH_SCAN < scan.rough <= VERY_ROUGH_SCAN),
+    # a scan so rough that hardly a grid passes is another one to samples that lie a little farther apart
+    AttemptRow("samples of a rough scan", ALL_LAYOUTS, lambda scan, now: scan.is_smooth(now), {"box_size": SAMPLE_SPACING}),
+    *(
+        AttemptRow(f"samples {share:g} times as far apart", ALL_LAYOUTS, _samples_fit(share), shares={"box_size": share})
+        for share in COARSER_SAMPLES
+    ),
+    AttemptRow("the paper's method", ALL_LAYOUTS, lambda scan, now: scan.by_default, {"method": "paper"}),
+)  # fmt: skip
+
+
+def attempts(cloud: PointCloud, settings: Settings, rows: Sequence[AttemptRow] = ROWS_TRIED) -> Iterator[Attempt]:
+    """Yield all attempts at a grid, the first as it was asked for; each of the others only where none before it passes.
+
+    Rather a grid without ridges than none, or one of the mean surface of a rough scan, or of another look at it. What follows the
+    outcome of an attempt is `AttemptCourse`'s.
+    """
+    scan, now = AskedScan(cloud, settings), settings
+    made: list[tuple[Settings, Starts]] = []
+    for row in rows:
+        if not row.when(scan, now):
+            continue
+        tried = row.changed(now)
+        for starts in layouts_of(tried)[row.fronts]:
+            if (tried, starts) not in made:
+                made.append((tried, starts))
+                yield Attempt(tried, starts, row=row.name)
+        now = tried if row.stays else now
+
+
+def layouts_of(settings: Settings) -> list[Starts]:
+    """Return how the fronts of a method are laid out: by rows, then by fronts that make all of their nodes themselves."""
+    alone: list[Starts] = [(FieldStart(scale=share, laid=False),) for share in FRONT_LENGTHS]
+    return [None, *alone] if settings.method == "default" else alone

@@ -1,0 +1,136 @@
+"""The law of the table of attempts, and of what follows from what came of them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+from shapes import make
+from small_clouds import cap, sheet
+
+import scantruss as st
+from scantruss.attempts.course import RIDGES_GIVEN_UP, WITHOUT_RODS, AttemptCourse
+from scantruss.attempts.limit import MOST_RUNS
+from scantruss.attempts.table import AS_ASKED, ROWS_TRIED, Attempt, attempts, layouts_of
+from scantruss.errors import FrontError
+
+NAMES = [row.name for row in ROWS_TRIED]
+
+
+def rough_sheet() -> np.ndarray:
+    points = sheet(8, 8, 0.1)
+    points[:, 2] += np.random.default_rng(0).normal(0.0, 0.07, len(points))
+    return points
+
+
+CLOUDS = {
+    "cap": (cap(4.0, 1.0, 0.25), {}),
+    "smooth": (sheet(8, 8, 0.04), {}),
+    "rough": (rough_sheet(), {}),
+    "folded": (make("gable", 20_000).points / 5.0, {}),
+    "samples set": (cap(4.0, 1.0, 0.25), {"box_size": 0.2}),
+    "paper": (cap(4.0, 1.0, 0.25), {"method": "paper"}),
+}
+
+
+def listed(name: str) -> tuple[st.Settings, list[Attempt]]:
+    points, own = CLOUDS[name]
+    asked = st.Settings(length=1.0, **cast(Any, own))
+    return asked, list(attempts(st.PointCloud.from_array(points), asked))
+
+
+def changed_between(one: st.Settings, other: st.Settings) -> set[str]:
+    """Names of the settings that two differ in."""
+    before, after = one.to_dict(), other.to_dict()
+    return {name for name in before if before[name] != after[name]}
+
+
+def test_each_row_has_a_name_of_its_own_and_the_first_changes_nothing() -> None:
+    assert len(set(NAMES)) == len(NAMES)
+    first = ROWS_TRIED[0]
+    assert first.name == AS_ASKED and not first.changes and not first.shares
+
+
+@pytest.mark.parametrize("name", CLOUDS)
+def test_attempts_come_in_the_order_of_the_table_each_once(name: str) -> None:
+    asked, tried = listed(name)
+    places = [NAMES.index(attempt.row) for attempt in tried]
+    assert places == sorted(places) and tried[0].settings == asked
+    kinds = [(attempt.settings, attempt.starts) for attempt in tried]
+    assert all(kinds.index(kind) == number for number, kind in enumerate(kinds))
+
+
+@pytest.mark.parametrize("name", CLOUDS)
+def test_an_attempt_differs_from_what_was_asked_in_what_its_row_says_and_rows_before_it_keep(name: str) -> None:
+    asked, tried = listed(name)
+    base = asked
+    for row in ROWS_TRIED:
+        own = [attempt for attempt in tried if attempt.row == row.name]
+        for attempt in own:
+            assert changed_between(base, attempt.settings) <= row.changes.keys() | row.shares.keys()
+            assert all(getattr(attempt.settings, key) == value for key, value in row.changes.items())
+            assert attempt.starts in layouts_of(attempt.settings)[row.fronts]
+            assert attempt.faults == () and not attempt.is_trial
+        if own and row.stays:
+            base = own[0].settings
+
+
+def driven(course: AttemptCourse, outcomes: dict[str, Any]) -> list[Attempt]:
+    """Run a course, each attempt coming to what is said of its row; returns those made."""
+    made = []
+    for attempt in course:
+        made.append(attempt)
+        outcome = outcomes.get(attempt.row, FrontError(f"fault {len(made)}"))
+        if isinstance(outcome, FrontError):
+            course.failed(attempt, outcome)
+        else:
+            course.passed(attempt, outcome)
+        assert len(made) <= 2 * MOST_RUNS
+    return made
+
+
+def test_where_none_passes_the_list_is_made_again_with_the_least_effort_and_ends() -> None:
+    points, _ = CLOUDS["cap"]
+    cloud, asked = st.PointCloud.from_array(points), st.Settings(length=1.0)
+    course = AttemptCourse(cloud, asked)
+    made = driven(course, {})
+    once = list(attempts(cloud, asked))
+    assert made == once + [replace(each, settings=each.settings.replace(effort="quick")) for each in once]
+    with pytest.raises(FrontError, match=r"fault 1$"):
+        course.outcome()
+
+
+def test_a_grid_along_rods_is_followed_by_one_attempt_without_and_the_better_is_taken(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("scantruss.attempts.course.runs_along_rods", lambda *_: True)
+    cloud, asked = st.PointCloud.from_array(CLOUDS["cap"][0]), st.Settings(length=1.0)
+    grids = {count: cast(Any, SimpleNamespace(certificate=SimpleNamespace(warnings=(0,) * count))) for count in (1, 2)}
+    for first, without in ((1, 2), (2, 1)):
+        course = AttemptCourse(cloud, asked)
+        made = driven(course, {AS_ASKED: grids[first], WITHOUT_RODS: grids[without]})
+        assert [each.row for each in made] == [AS_ASKED, WITHOUT_RODS]
+        assert changed_between(asked, made[1].settings) == {"keep_rods"}
+        assert course.outcome() is grids[1]
+    course = AttemptCourse(cloud, asked)
+    assert len(driven(course, {AS_ASKED: grids[2]})) == 2 and course.outcome() is grids[2]
+
+
+def test_ridges_are_given_up_right_after_the_fault_and_the_first_fault_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    def after(self: Attempt, fault: FrontError, cloud: st.PointCloud) -> Attempt | None:
+        if self.row not in (AS_ASKED, RIDGES_GIVEN_UP) or len(self.faults) == 2:
+            return None
+        return replace(self, faults=(*self.faults, (float(len(self.faults)), 0.0, 0.0)))
+
+    monkeypatch.setattr(Attempt, "after", after)
+    cloud, asked = st.PointCloud.from_array(CLOUDS["cap"][0]), st.Settings(length=1.0, effort="quick")
+    course = AttemptCourse(cloud, asked)
+    made = driven(course, {})
+    assert [each.row for each in made[:4]] == [AS_ASKED, RIDGES_GIVEN_UP, RIDGES_GIVEN_UP, NAMES[2]]
+    assert [len(each.faults) for each in made[:4]] == [0, 1, 2, 0] and all(a.settings == asked for a in made[:4])
+    assert len(made) == len(list(attempts(cloud, asked))) + 2
+    with pytest.raises(FrontError, match=r"fault 1$"):
+        course.outcome()
