@@ -41,6 +41,7 @@ COARSEST_SAMPLES = 0.5  # largest of them, in desired lengths
 FAR_FROM_PASSING = 12  # cuts and missing boundary loops above which other fronts with the same samples do not help
 # share of the scan that a grid misses above which other fronts do not help either, in shares that may be missing; of thin limbs 1
 FAR_MISSING = 2.0
+SAID_BESIDE_RODS = ("aside", "far", "peak")  # kinds of warnings of a grid that runs along rods, or misses them
 BESIDE_RODS = 0.5  # distance from a rod within which the place of a warning is beside it [member lengths]
 MOST_RUNS = 24  # grids that are made at most, before a scan is refused
 MOST_RUNS_OF_CELLS = 3  # grids of quads or hexagons that are made at most; they are made of triangles that pass
@@ -147,14 +148,14 @@ def attempts(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:
 
 
 def runs_along_rods(grid: Grid, cloud: PointCloud, settings: Settings) -> bool:
-    """Whether a grid that passes leaves the boundary of its scan beside rods, as where its edge runs down a column."""
+    """Whether a grid that passes leaves the boundary of its scan beside rods, as where its edge runs down a column, or misses rods."""
     found = grid.certificate
     if not settings.keep_rods or settings.method != "default" or found is None:
         return False
     places = [
         place
         for warning in found.warnings
-        if warning.kind == "aside"
+        if warning.kind in SAID_BESIDE_RODS
         for place in (warning.where, *warning.also)
         if place is not None
     ]
