@@ -17,7 +17,8 @@ import scantruss as st
 from scantruss import pipeline
 from scantruss.attempts.table import Attempt
 from scantruss.cli.main import main
-from scantruss.report.advice import LEAST_TRIED, MOST_TRIED, SURE_PER_SPACING, TRIED_AROUND, Advice, LengthTrial
+from scantruss.report.advice import LEAST_TRIED, MOST_TRIED, SURE_PER_SPACING, TRIED_AROUND, Advice
+from scantruss.report.length_trial import LengthTrial
 from scantruss.report.lengths import advice_lines, advice_rows
 from scantruss.scan.member_length import length_range, round_length, suggest_length
 from scantruss.surface.samples import SurfaceSamples
@@ -279,6 +280,33 @@ def test_the_suggested_length_passes_also_where_the_usual_one_and_its_neighbours
         and known(advice.try_length(length)).passed
         and known(advice.try_length(advice.next_above(length))).passed
     )
+
+
+def test_a_length_beside_the_usual_one_is_suggested_where_steps_of_the_table_miss_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    cloud = cloud_of("limpet")
+    usual = Advice(cloud, st.Settings(length=1.0)).suggest()
+    made = counted_runs(monkeypatch, lambda length: 1.05 * usual < length < 1.2 * usual)
+    advice = Advice(cloud, st.Settings(length=1.0))
+    assert 1.05 * usual < advice.suggest() < 1.2 * usual and advice.passes
+    assert len(made) <= MOST_TRIED + TRIED_AROUND
+
+
+def test_of_lengths_that_lose_about_as_much_the_usual_one_is_suggested(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As of a canopy whose mast is left out at each of them: a few points more or less decide nothing, nor does the unit with them."""
+
+    def tried(advice: Advice, length: float, most: int = 0) -> LengthTrial:
+        lost = 0.033 if length >= advice._usual else least
+        return LengthTrial(length, cast(Any, SimpleNamespace(certificate=SimpleNamespace(judged_out=lost))))
+
+    monkeypatch.setattr(Advice, "try_length", tried)
+    advice = Advice(cloud_of("limpet"), st.Settings(length=1.0))
+    monkeypatch.setattr(advice, "next_above", lambda length: 1.3 * length)
+    least = 0.0325
+    assert advice.suggest() == advice._usual
+    least = 0.02
+    assert advice.suggest() < advice._usual
 
 
 def test_info_says_which_lengths_pass_and_why_others_do_not(

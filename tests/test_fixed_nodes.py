@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 from marks import compiled_only
 from rough import Rough, rough_disc, rough_sphere, same_topology
+from small_clouds import sheet
 from steps import boundary_of, optimized
 
-from scantruss import Grid, InputError, PointCloud, Settings
+from scantruss import Grid, InputError, PointCloud, Settings, grid_from_points
 from scantruss.constraints.fixed_nodes import check_fixed_positions
+from scantruss.grid.marks import node_marks
 from scantruss.surface.samples import sample_surface
 
 MAKERS: dict[str, Callable[[], Rough]] = {
@@ -156,3 +158,19 @@ def test_a_position_off_the_scan_comes_with_the_nearest_point() -> None:
         check_fixed_positions([far.tolist()], sample_surface(cloud, settings), settings.length)
     named = np.array([float(word) for word in str(refused.value).rsplit("(", 1)[1].rstrip(")").split(",")])
     assert np.allclose(named, points[np.linalg.norm(points - far, axis=1).argmin()], atol=1e-6)
+
+
+@compiled_only
+@pytest.mark.parametrize(
+    ("height", "words"), [(0.0, None), (0.2, "0.20 members, 0.2 m, off the scan, as its position is fixed")]
+)
+def test_a_fixed_node_off_the_scan_is_a_warning_with_its_mark(height: float, words: str | None) -> None:
+    settings = Settings(length=1.0, unit="m", effort="quick", fixed=[(0.3, 0.2, height)])
+    grid = grid_from_points(sheet(8.0, 6.0, 0.1), settings)
+    assert grid.certificate is not None
+    found = [warning for warning in grid.certificate.warnings if warning.kind == "fixed"]
+    assert len(found) == (words is not None)
+    if words is not None:
+        (node,) = np.flatnonzero(grid.fixed)
+        assert found[0].words == f"has its node {node_marks(grid)[node]} {words}"
+        assert found[0].where == pytest.approx((0.3, 0.2, height))

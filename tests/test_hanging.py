@@ -91,3 +91,48 @@ def test_a_cliff_that_the_scanner_did_not_see_is_none() -> None:
     nodes[nodes[:, 0] > 0.2, 2] -= 0.7
     samples, grid = scanned(points, grid.replace(nodes=nodes))
     assert not any(fault.kind == "hanging" for fault in certify(grid, samples, NOTHING, SETTINGS).faults)
+
+
+def peak(places: np.ndarray) -> np.ndarray:
+    """Heights (N,) of a membrane that rises to a high point at the origin."""
+    heights: np.ndarray = 2.4 * np.exp(-np.linalg.norm(places[:, :2], axis=1) / 1.6)
+    return heights
+
+
+def mast(radius: float, low: float, high: float, count: int = 500) -> np.ndarray:
+    """Points on an upright tube at the origin."""
+    turn, height = np.random.default_rng(3).uniform([[0.0], [low]], [[2.0 * np.pi], [high]], (2, count))
+    return np.column_stack([radius * np.cos(turn), radius * np.sin(turn), height])
+
+
+@pytest.mark.parametrize(
+    ("tip", "hole", "fails"), [(2.75, 0.57, True), (1.1, 0.57, True), (1.75, 0.57, False), (2.4, 0.0, False)]
+)
+def test_a_node_up_or_down_the_mast_of_a_peak_is_a_fault_and_one_on_the_peak_is_none(
+    tip: float, hole: float, fails: bool
+) -> None:
+    """The sheet rises to the mast, so that no normal around it tells; where it ends beside the mast, it is 1.68 high."""
+    points = ROOF[np.hypot(ROOF[:, 0], ROOF[:, 1]) >= hole]
+    points[:, 2] = peak(points)
+    grid = lattice()
+    nodes = grid.nodes.copy()
+    nodes[:, 2] = peak(nodes)
+    nodes[np.linalg.norm(grid.nodes, axis=1).argmin(), 2] = tip
+    samples, grid = scanned(np.concatenate([points, mast(0.09, -1.0, 2.9 if hole else 2.4)]), grid.replace(nodes=nodes))
+    found = nodes_off_sheets(grid, samples, 1.0)
+    assert bool(found) == fails
+    if fails:
+        assert known(found[0].where) == pytest.approx((0.0, 0.0, tip), abs=1e-9)
+
+
+def test_the_mast_of_a_canopy_is_left_out_and_its_peak_is_followed() -> None:
+    rng = np.random.default_rng(8)
+    way, turn = 4.0 * np.sqrt(rng.uniform(0.02, 1.0, 9000)), rng.uniform(0.0, 2.0 * np.pi, 9000)
+    membrane = np.column_stack([way * np.cos(turn), way * np.sin(turn), 0.0 * way])
+    membrane[:, 2] = peak(membrane)
+    grid = st.grid_from_points(
+        np.concatenate([membrane, mast(0.09, -1.0, 2.9)]), st.Settings(length=1.0, effort="quick")
+    )
+    nodes = grid.scan_nodes
+    assert abs(nodes[:, 2] - peak(nodes)).max() < 0.1
+    assert nodes[:, 2].max() > 1.5

@@ -65,6 +65,14 @@ def test_points_at_random_on_lines_ever_sparser_or_half_as_dense_bridge_nothing(
         assert gap_of(certified(np.column_stack([flat, 0.01 * rng.normal(size=len(flat))]))) is None, seed
 
 
+@pytest.mark.parametrize(("seed", "count"), [(308, 4000), (82, 3000), (188, 3000)])
+def test_an_empty_place_nearly_round_with_few_points_around_is_an_accident(seed: int, count: int) -> None:
+    """One such place is on every hundredth sheet of so many points at random."""
+    rng = np.random.default_rng(seed)
+    flat = rng.uniform([-6.5, -4], [6.5, 4], (count, 2))
+    assert gap_of(certified(np.column_stack([flat, 0.01 * rng.normal(size=count)]))) is None
+
+
 @compiled_only
 @pytest.mark.parametrize("length", [1.5, 2.0, 3.2])
 def test_the_grid_of_a_sail_with_a_cut_says_so(length: float) -> None:

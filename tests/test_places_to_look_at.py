@@ -12,11 +12,13 @@ from typed import known
 
 import scantruss as st
 from scantruss.boundary.find import Boundary, Loop
-from scantruss.check.boundaries import boundary_beyond, places_aside
+from scantruss.check.boundaries import boundary_beyond, places_aside, stops_short
 from scantruss.check.certify import certify, passed_grid
+from scantruss.check.distances import measure_distances
 from scantruss.check.doubtful import doubtful_places, zigzags
 from scantruss.check.gaps import bridged_gaps
 from scantruss.check.limits import places_to_look_at
+from scantruss.check.openings import boundary_overrun
 from scantruss.errors import CertificateError
 from scantruss.grid.certificate import Certificate, Fault, LeftOut
 from scantruss.report.figures import left_out_lines
@@ -153,12 +155,19 @@ def test_a_hole_of_the_scan_is_none_to_doubt_but_one_between_sparse_points_or_le
     (warning,) = doubtful_places(grid, samples, 1.0)
     assert warning.kind == "hole" and "may be none" in warning.words
     assert np.linalg.norm(np.array(known(warning.where))[:2] - middle) < 0.05
-    samples, grid = scanned(np.concatenate([true, [[*middle, 0.05]]]), holed)
-    judged = np.where(
-        np.linalg.norm(samples.scan[:, :2] + samples.origin[:2] - middle, axis=1) < 0.2, OUTLIER, samples.judged
-    )
-    (warning,) = doubtful_places(grid, replace(samples, judged=judged.astype(np.uint8)), 1.0)
-    assert warning.words == "has a hole where points were left out"
+    inside = sheet(1.2, 1.2, 0.12, keep=lambda x, y: np.hypot(x, y) < 0.55) + [*middle, 0.05]
+    turn, height = np.random.default_rng(5).uniform([[0.0], [-2.0]], [[2.0 * np.pi], [2.0]], (2, 900))
+    mast = np.column_stack([0.08 * np.cos(turn), 0.08 * np.sin(turn), height]) + [*middle, 0.0]
+    for more, doubted in (
+        (inside, True),
+        (inside[::12], False),
+        (mast, False),
+    ):  # a few strays, or a mast, do not fill it
+        samples, grid = scanned(np.concatenate([true, more]), holed)
+        near = np.linalg.norm(samples.scan[:, :2] + samples.origin[:2] - middle, axis=1) < 0.6
+        judged = np.where(near, OUTLIER, samples.judged).astype(np.uint8)
+        found = doubtful_places(grid, replace(samples, judged=judged), 1.0)
+        assert [warning.words for warning in found] == ["has a hole where points were left out"] * doubted
 
 
 def test_teeth_are_a_zigzag_and_straight_sides_corners_and_a_step_are_none() -> None:
@@ -283,6 +292,73 @@ def test_a_grid_that_runs_beyond_the_scan_fails_and_one_that_stops_short_of_it_d
         if fails:
             assert abs(known(found[0].where)[0]) < 2.0 and known(found[0].where)[1] < -1.5
             assert found[0].words.startswith("runs beyond the boundary of the scan by ")
+
+
+def test_points_beyond_the_boundary_are_a_warning_however_few_but_strays_are_none() -> None:
+    """The boundary that is found goes by them too, as through a bay where points are sparse at random."""
+    grid, shape = lattice(), np.array([0.5, 0.75**0.5])
+    points = sheet(13, 8, 0.06, keep=lambda x, y: (abs(x - y / 3**0.5) < 4.0) & (abs(y) < 4.0 * 0.75**0.5))
+    beyond = np.array([[0.0, 0.0], [0.08, 0.05], [0.02, 0.1]]) + shape * [0.0, 4.0] + [0.3, 0.22]
+    for more, said in (
+        (beyond, True),
+        (beyond[:2], False),
+        (beyond * [1.0, 1.3] + [[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]], False),
+    ):
+        samples, moved = scanned(np.concatenate([points, np.column_stack([more, 0.0 * more[:, 0]])]), grid)
+        found = measure_distances(moved, samples, 1.0)
+        chosen, members = np.ones(len(samples.scan), np.bool_), np.ones(len(samples.scan))
+        warnings = stops_short(moved, samples, found, chosen, members, [])
+        assert bool(warnings) == said
+        if said:
+            assert warnings[0].words == "stops short of the scan at its boundary by 0.32 members"
+            assert known(warnings[0].where)[:2] == pytest.approx(tuple(more[2]))
+            aside = [Fault("aside", "", warnings[0].where)]
+            assert not stops_short(moved, samples, found, chosen, members, aside)
+
+
+def test_an_opening_that_is_mostly_bridged_is_a_fault_and_one_that_members_cut_across_is_none() -> None:
+    grid = lattice()
+    (outer,) = bounded(grid).loops
+    node = int(np.linalg.norm(grid.nodes, axis=1).argmin())
+    turn = np.linspace(0.0, 2.0 * np.pi, 60, endpoint=False)
+    ring = grid.nodes[node] + 0.95 * np.column_stack([np.cos(turn), np.sin(turn), 0.0 * turn])
+    boundary = Boundary((outer, Loop(ring, np.zeros(0, np.int64), external=False, length=6.0, piece=0)))
+    around = np.flatnonzero((grid.triangles == node).any(axis=1))
+    shared = [(a, b) for a in around for b in around if a < b and len({*grid.triangles[a]} & {*grid.triangles[b]}) == 2]
+    assert boundary_overrun(without_node(grid, node), boundary, 1.0) == []
+    partly = grid.replace(triangles=np.delete(grid.triangles, shared[0], axis=0))
+    (fault,) = boundary_overrun(partly, boundary, 1.0)
+    assert fault.words == "bridges 70% of an opening 1.9 mm across"
+    assert np.linalg.norm(np.array(known(fault.where)) - grid.nodes[node]) == pytest.approx(0.95)
+    samples, same = scanned(sheet(13, 8, 0.08), partly)
+    moved = Boundary(tuple(replace(loop, points=loop.points - same.origin) for loop in boundary.loops))
+    assert "beyond" in {fault.kind for fault in certify(same, samples, moved, SETTINGS).faults}
+
+
+@pytest.mark.parametrize(("wide", "fails"), [(0.8, False), (1.6, True)])
+def test_a_grid_that_runs_beyond_more_than_a_member_of_the_boundary_fails(wide: float, fails: bool) -> None:
+    grid = lattice()
+    (loop,) = bounded(grid).loops
+    points = loop.points.copy()
+    x, y, _ = points.T
+    way = np.where((y > 3.4) & (abs(x - 2.0) < 0.5 * wide), 0.85, 0.0)
+    points[:, 1] -= way
+    found = boundary_overrun(grid, Boundary((replace(loop, points=points),)), 1.0)
+    assert [fault.words.split(",")[0] for fault in found] == [
+        "runs beyond the boundary of the scan by 0.85 members"
+    ] * fails
+    points[:, 1] += 2.0 * way  # where it stops short, the share that it misses decides
+    assert boundary_overrun(grid, Boundary((replace(loop, points=points),)), 1.0) == []
+
+
+def test_what_is_listed_as_left_out_is_not_warned_of_twice() -> None:
+    base = Certificate("", 0.5, True, True, 1, 1, 1, 1, 1, 0, missing=0.029)
+    assert [each.kind for each in places_to_look_at(base, (0.0, 0.0, 0.0))] == ["missed"]
+    limb = replace(base, left_out=(LeftOut("limbs", 290, 0.029, (0.0, 0.0, 0.0), 8.0, 8.0),))
+    assert [each.kind for each in places_to_look_at(limb, (0.0, 0.0, 0.0))] == ["left out"]
+    more = replace(limb, missing=0.041)
+    missed = places_to_look_at(more, (0.0, 0.0, 0.0))[0]
+    assert missed.words == "misses 1.2% of the points by more than half a member"
 
 
 def test_a_corner_that_is_cut_off_is_a_warning_with_its_place() -> None:

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 # shares of thick samples from which on a scan is rough, and so rough that its mean surface comes first
 ROUGH_SCAN, VERY_ROUGH_SCAN = 0.02, 0.25
 MANY_OUTLIERS = 0.002  # share of the points that must be outliers for a grid to be tried without them
+SAID_BESIDE_RODS = ("aside", "far", "peak")  # kinds of warnings of a grid that runs along rods, or misses them
 BESIDE_RODS = 0.5  # distance from a rod within which the place of a warning is beside it [member lengths]
 
 
@@ -102,14 +103,14 @@ class AskedScan:
 
 
 def runs_along_rods(grid: Grid, cloud: PointCloud, settings: Settings) -> bool:
-    """Whether a grid that passes leaves the boundary of its scan beside rods, as where its edge runs down a column."""
+    """Whether a grid that passes leaves the boundary of its scan beside rods, as where its edge runs down a column, or misses rods."""
     found = grid.certificate
     if not settings.keep_rods or settings.method != "default" or found is None:
         return False
     places = [
         place
         for warning in found.warnings
-        if warning.kind == "aside"
+        if warning.kind in SAID_BESIDE_RODS
         for place in (warning.where, *warning.also)
         if place is not None
     ]

@@ -11,19 +11,25 @@ from ..constraints.network import curves_of
 from ..grid.certificate import Fault
 from ..kernels.boundary.curves import Curves, distances_from_curves
 from ..kernels.mesh.coverage import nearest_distances
-from .distances import POINT_BOX, boxes_of, distances_to_grid
-from .limits import HEXAGON_BOUNDARY, Figure
+from .distances import POINT_BOX, boxes_of, distances_to_grid, heights_over
+from .left_out import points_together
+from .limits import HEXAGON_BOUNDARY, NOISES_OFF, Figure
 
 if TYPE_CHECKING:
     from ..boundary.find import Boundary
     from ..grid.grid import Grid
     from ..surface.samples import SurfaceSamples
+    from .distances import Distances
 
 WARN_ASIDE = 0.25  # distance between the boundaries of grid and scan above which it is poor [member lengths]
 # ... above which it is a fault where the grid covers what the scan does not, and how far from triangles its boundary, or from points a
 # member, must lie for that at most and at least; where a grid stops short, the share that it misses decides [member lengths]
 MOST_BEYOND, COVERED_WITHIN, EMPTY_FROM = 1.0, 0.2, 0.25
 SPACINGS_OUT = 5.0  # ... and in spacings of the points
+# points that a grid stops short of at its boundary: how far off they are, beside the noise, at least [member lengths], how many together
+# are no strays, and how far apart they are at most [spacings of the points]
+WARN_SHORT_OF, FEWEST_BEYOND, BEYOND_TOGETHER = 0.2, 3, 4.0
+LEVEL = 0.5  # height over the grid of such a point, in its distance from it, at most: others are of a wall or a beam
 WARN_CUT = (
     0.15  # distance of a corner of the boundary from the nearest node of it above which it is cut off [member lengths]
 )
@@ -66,6 +72,47 @@ def places_aside(grid: Grid, boundary: Boundary, length: float) -> list[Fault]:
     )  # fmt: skip
     warnings = (replace(figure, places=figure.places + grid.origin).beyond(figure.poor) for figure in found)
     return [warning for warning in warnings if warning is not None]
+
+
+def stops_short(
+    grid: Grid,
+    samples: SurfaceSamples,
+    found: Distances,
+    chosen: np.ndarray,
+    members: np.ndarray,
+    said: list[Fault],
+) -> list[Fault]:
+    """Return a warning of places where points of the scan lie beyond the boundary of a grid, though they are few.
+
+    The boundary that was found in the scan may leave them out too.
+
+    Parameters
+    ----------
+    said : warnings of a boundary that leaves the scan's; within a member of their places nothing is said again
+    chosen : (N,) bool, points of the scan that the grid is to follow
+    members : (N,) desired member length at each point [scan unit]
+    """
+    chains = grid.boundary_loops
+    least = WARN_SHORT_OF * (HEXAGON_BOUNDARY**2 if grid.cells == "hexagon" else 1.0) * members
+    least = least + NOISES_OFF * float(np.median(found.noise))
+    off = np.flatnonzero(chosen & (found.scan > least) & (found.scan <= members))
+    if len(off) < FEWEST_BEYOND or not chains:
+        return []
+    chained = curves_of([grid.nodes[chain] for chain in chains], [True] * len(chains))
+    places, away = samples.scan[off], found.scan[off]
+    beyond = _distances(chained, places) <= away + 1e-6 * members[off]
+    beyond &= np.abs(heights_over(grid, found.triangle[off], places)[0]) <= LEVEL * away
+    off = off[beyond]
+    if len(off) < FEWEST_BEYOND:
+        return []
+    part = points_together(samples.scan[off], np.full(len(off), BEYOND_TOGETHER * samples.spacing))
+    off = off[np.bincount(part)[part] >= FEWEST_BEYOND]
+    for place in (place for each in said if each.kind == "aside" for place in (each.where, *each.also) if place):
+        off = off[np.linalg.norm(samples.scan[off] + samples.origin - place, axis=1) > members[off]]
+    figure = _figure("stops", "stops short of the scan at its boundary by {:.2f} members", 0.0,
+                     found.scan[off] / members[off], samples.scan[off] + samples.origin, members[off])  # fmt: skip
+    warning = figure.beyond(figure.poor)
+    return [warning] if warning is not None else []
 
 
 def boundary_beyond(grid: Grid, samples: SurfaceSamples, boundary: Boundary, length: float) -> list[Fault]:

@@ -16,9 +16,9 @@ from ..grid.certificate import Certificate, Fault, Spread, Worst, place_of
 from ..runtime.parallel import side_by_side
 from ..surface.chosen_samples import KEPT, LIMB, SLIT
 from .bare import mostly_bare
-from .boundaries import boundary_beyond, places_aside
+from .boundaries import boundary_beyond, places_aside, stops_short
 from .crossings import find_crossings
-from .defects import faults_in_space, faults_of_topology
+from .defects import faults_in_space, faults_of_topology, fixed_off_scan
 from .distances import Distances, measure_distances, offsets_from_points
 from .doubtful import doubtful_places
 from .folds import fold_angles
@@ -27,6 +27,7 @@ from .hanging import hanging_nodes, nodes_off_sheets
 from .irregular import count_irregular
 from .left_out import closed_holes, first_and_more, parts_left_out
 from .limits import NOISES_OFF, ROUNDED_BY, limits_of, mostly_rounded, places_to_look_at, widened_limits
+from .openings import boundary_overrun
 from .sheets import cut_apart, faults_on_sheets, nodes_of_samples
 from .slits import feet_on, narrow_gaps
 from .sparse import sparse_parts
@@ -105,8 +106,8 @@ class Judged:
             lambda: _offsets(grid, samples, length),
             lambda: bridged_gaps(grid, samples, boundary, length),
             lambda: [] if settings.boundary else doubtful_places(grid, samples, length),
-            lambda: places_aside(grid, boundary, length),
-            lambda: boundary_beyond(grid, samples, boundary, length),
+            lambda: _at_boundary(grid, samples, boundary, found, followed, members, length),
+            lambda: boundary_beyond(grid, samples, boundary, length) or boundary_overrun(grid, boundary, length),
             lambda: [] if rough else _beside(grid, samples, found, followed, members),
             lambda: cut_apart(grid, samples, found, length),
             lambda: mostly_bare(grid, samples, feet, length),
@@ -175,7 +176,12 @@ def judge(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings: Set
         *_mostly_unfollowed(grid, samples, found, length),
     )
     faults += [fault for fault in further if fault.kind not in known]
-    certificate = replace(certificate, faults=tuple(faults), warnings=tuple(poor), widened=widened_limits(settings))
+    certificate = replace(
+        certificate,
+        faults=tuple(faults),
+        warnings=(*poor, *fixed_off_scan(grid, found, length)),
+        widened=widened_limits(settings),
+    )
     return Judged(grid, samples, boundary, settings, certificate, found)
 
 
@@ -316,6 +322,20 @@ def _beside(
     """Return a warning of what a grid does not follow though it lies along it; parameters as of `unfollowed_parts`."""
     parts = unfollowed_parts(grid, samples, found, followed, members)
     return parts or unfollowed_steps(grid, samples, found, followed, members)
+
+
+def _at_boundary(
+    grid: Grid,
+    samples: SurfaceSamples,
+    boundary: Boundary,
+    found: Distances,
+    followed: np.ndarray,
+    members: np.ndarray,
+    length: float,
+) -> list[Fault]:
+    """Return warnings of where the boundary of a grid is not that of its scan; parameters as of `stops_short`."""
+    aside = places_aside(grid, boundary, length)
+    return aside + stops_short(grid, samples, found, followed, members, aside)
 
 
 def _missed(found: Distances, followed: np.ndarray, members: np.ndarray) -> int:

@@ -9,15 +9,17 @@ import numpy as np
 
 from ..errors import Place
 from ..grid.certificate import Certificate, Fault, place_of
+from ..grid.marks import node_marks
 from ..grid.topology import pinched_nodes
 from ..kernels.geometry.components import component_labels
 from .crossings import MOST_CROSSINGS
-from .limits import PLACES_KEPT
+from .limits import NOISES_OFF, PLACES_KEPT, WARN_OFFSET
 
 if TYPE_CHECKING:
     from ..boundary.find import Boundary
     from ..grid.grid import Grid
     from ..settings import Settings
+    from .distances import Distances
 
 OFF_SURFACE = (
     0.5  #: members from the scan, beside the radius of the holes that are closed, at which a triangle has left it
@@ -105,3 +107,21 @@ def faults_in_space(grid: Grid, found: Certificate, crossings: np.ndarray, setti
     if found.fixed_error and not found.fixed_error.value <= FIXED_TOLERANCE * settings.length:
         faults.append(Fault("fixed", "has no node at a fixed position", found.fixed_error.where))
     return faults
+
+
+def fixed_off_scan(grid: Grid, found: Distances, length: float) -> list[Fault]:
+    """Return a warning of fixed nodes that make a spike or a dent, as they were put off the scan, with the mark of the worst."""
+    own = np.full(len(grid.nodes), length) if grid.desired is None else grid.desired
+    off = np.where(grid.fixed & np.isfinite(found.nodes), found.nodes, 0.0) / own
+    nodes = np.flatnonzero(off > WARN_OFFSET + NOISES_OFF * found.noise / own)
+    if not len(nodes):
+        return []
+    nodes = nodes[np.argsort(-off[nodes], kind="stable")]
+    worst, unit = nodes[0], f" {grid.unit}" if grid.unit else ""
+    more = f" ({len(nodes)} such places)" if len(nodes) > 1 else ""
+    words = (
+        f"has its node {node_marks(grid)[worst]} {off[worst]:.2f} members, {found.nodes[worst]:.3g}{unit}, off the scan,"
+        f" as its position is fixed{more}"
+    )
+    at, *others = (place_of(grid.nodes[node] + grid.origin) for node in nodes[:PLACES_KEPT])
+    return [Fault("fixed", words, at, tuple(others))]

@@ -129,7 +129,7 @@ def offsets_from_points(grid: Grid, samples: SurfaceSamples, length: float) -> t
     desired = np.full(len(grid.nodes), length) if grid.desired is None else grid.desired
     bias, scatter = np.empty(len(grid.nodes)), np.empty(len(grid.nodes))
     boxes = boxes_of(points, POINT_BOX * length)
-    mean_offsets(grid.nodes, _node_normals(grid), points, boxes, AROUND_NODE * desired, bias, scatter, 0, len(bias))
+    mean_offsets(grid.nodes, normals_at_nodes(grid), points, boxes, AROUND_NODE * desired, bias, scatter, 0, len(bias))
     if grid.deviation is not None:
         bias[np.isnan(grid.deviation)] = np.nan
     return bias, scatter
@@ -148,7 +148,7 @@ def heights_over(grid: Grid, triangle: np.ndarray, points: np.ndarray) -> tuple[
     return ((points - grid.nodes[grid.triangles[triangle, 0]]) * normal).sum(axis=1), normal
 
 
-def _node_normals(grid: Grid) -> np.ndarray:
+def normals_at_nodes(grid: Grid) -> np.ndarray:
     """Return the unit normal of each node (V, 3), the mean of its triangles by their areas."""
     a, b, c = (grid.nodes[grid.triangles[:, k]] for k in range(3))
     own, corners = np.repeat(np.cross(b - a, c - a), 3, axis=0), grid.triangles.ravel()

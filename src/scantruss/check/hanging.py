@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..grid.certificate import Fault, place_of
 from ..kernels.mesh.coverage import nearest_distances
-from .distances import POINT_BOX, boxes_of
+from .distances import POINT_BOX, boxes_of, normals_at_nodes
 from .gaps import by_x, points_within
 from .limits import PLACES_KEPT
 
@@ -32,6 +34,16 @@ FEWEST_MEMBERS = (
 LITTLE_EMPTY, SPACINGS_LITTLE_EMPTY = 0.1, 5.0  # as HALF_EMPTY and SPACINGS_EMPTY for the members of a spike
 EVEN = 0.8  # cosine of the angle between a spike and the normal of the sheet at the other end of its member
 LESS_STEEP, EVEN_FLAT = 0.3, 0.9  # as STEEP and EVEN of a spike that is poor: on a bent sheet one excludes the other
+# a sheet that rises to a mast is not even, so that a node elsewhere on the mast is no spike: the points around it tell
+AROUND_ON_MAST = 0.6  # radius around such a node [member lengths]
+THIN_ON_MAST = (
+    0.15  # variance there across a mast, in that along it, at most: on a cone of 22 degrees and more it is larger
+)
+LEANS = 0.7  # cosine of the angle between a mast and the normal of the grid at the node, least
+BESIDE_MAST = 1.2  # distance from the mast within which the sheet around it is looked for [member lengths]
+EDGE_AT_MAST = 0.15  # width of the edge of that sheet, which tells where it meets the mast [member lengths]
+OFF_ALONG_MAST = 1.0 / 3.0  # height over or under that edge, least [member lengths]
+WIDTHS_OF_MAST = 3.0  # distance from its axis up to which points are of the mast [standard deviations across it]
 
 
 def hanging_nodes(grid: Grid, samples: SurfaceSamples, found: Distances, length: float) -> list[Fault]:
@@ -48,10 +60,14 @@ def hanging_nodes(grid: Grid, samples: SurfaceSamples, found: Distances, length:
 
 
 def nodes_off_sheets(grid: Grid, samples: SurfaceSamples, length: float) -> list[Fault]:
-    """Return a fault where nodes stand off an even sheet but not so far that they hang, with their places; parameters as there."""
+    """Return a fault where nodes stand off an even sheet but not so far that they hang, or on a mast, with their places.
+
+    Parameters as of `hanging_nodes`.
+    """
     desired = np.full(len(grid.nodes), length) if grid.desired is None else grid.desired
     hanging = _spikes(grid, samples, desired, STEEP, EVEN)
-    nodes = np.setdiff1d(_spikes(grid, samples, desired, LESS_STEEP, EVEN_FLAT), hanging)
+    standing = np.union1d(_spikes(grid, samples, desired, LESS_STEEP, EVEN_FLAT), _on_masts(grid, samples, desired))
+    nodes = np.setdiff1d(standing, hanging)
     return _fault("off sheet", "has a node on points that stand off the sheet around it", grid, nodes)
 
 
@@ -90,34 +106,94 @@ def _far_off(grid: Grid, samples: SurfaceSamples, found: Distances, desired: np.
     return np.flatnonzero(_hangs(grid, doubted, uses))
 
 
+@dataclass(frozen=True, eq=False)
+class PointedNodes:
+    """Nodes whose members leave to one side, as at the tip of a pyramid, and those of their members that cross empty space."""
+
+    axes: np.ndarray  #: (V, 3) mean of the unit vectors along the members of each node of the grid
+    uses: np.ndarray  #: (V,) members at each node
+    node: np.ndarray  #: (K,) pointed node of each such member
+    foot: np.ndarray  #: (K,) its other end
+    ways: np.ndarray  #: (K, 3) unit vector from the node to the foot
+
+    def mostly(self, chosen: np.ndarray) -> np.ndarray:
+        """Return the nodes (N,) of which enough of all members are chosen ones (K,) bool."""
+        count = np.bincount(self.node[chosen], minlength=len(self.uses))
+        return np.flatnonzero((count >= FEWEST_MEMBERS) & (2 * count >= self.uses))
+
+
+def _pointed_nodes(grid: Grid, samples: SurfaceSamples, desired: np.ndarray, steep: float) -> PointedNodes:
+    """Return the nodes within a grid whose mean unit vector along members (V, 3) is longer than `steep`."""
+    ends = np.concatenate([grid.edges, grid.edges[:, ::-1]])
+    ways = grid.nodes[ends[:, 1]] - grid.nodes[ends[:, 0]]
+    ways /= np.maximum(np.linalg.norm(ways, axis=1), 1e-300)[:, None]
+    uses = np.maximum(np.bincount(ends[:, 0], minlength=len(grid.nodes)), 1)
+    axes = np.stack([np.bincount(ends[:, 0], ways[:, k], len(grid.nodes)) for k in range(3)], axis=1) / uses[:, None]
+    pointed = np.linalg.norm(axes, axis=1) > steep
+    pointed[grid.edges[grid.edge_triangles[:, 1] < 0]] = False
+    which = np.flatnonzero(pointed[ends[:, 0]])
+    if len(which):
+        least = np.maximum(LITTLE_EMPTY * desired[ends[which, 0]], SPACINGS_LITTLE_EMPTY * samples.spacing)
+        which = which[_middles_away(grid, samples, which % len(grid.edges), desired) > least]
+    node, foot = ends[which].T
+    return PointedNodes(axes, uses, node, foot, ways[which])
+
+
 def _spikes(grid: Grid, samples: SurfaceSamples, desired: np.ndarray, steep: float, even: float) -> np.ndarray:
     """Return the nodes (K,) that lie off an even sheet, from which most of their members leave for them, beside points.
 
     steep : sine of the angle between such a member and the sheet, least
     even : cosine of the angle between the spike and the normals of the sheet, least
     """
-    ends = np.concatenate([grid.edges, grid.edges[:, ::-1]])
-    ways = grid.nodes[ends[:, 1]] - grid.nodes[ends[:, 0]]
-    ways /= np.maximum(np.linalg.norm(ways, axis=1), 1e-300)[:, None]
-    uses = np.maximum(np.bincount(ends[:, 0], minlength=len(grid.nodes)), 1)
-    axes = np.stack([np.bincount(ends[:, 0], ways[:, k], len(grid.nodes)) for k in range(3)], axis=1) / uses[:, None]
-    sharp = np.linalg.norm(axes, axis=1)
-    pointed = sharp > steep
-    pointed[grid.edges[grid.edge_triangles[:, 1] < 0]] = False
-    which = np.flatnonzero(pointed[ends[:, 0]])
-    if not len(which):
-        return which
-    away = _middles_away(grid, samples, which % len(grid.edges), desired)
-    node, foot = ends[which].T
-    empty = away > np.maximum(LITTLE_EMPTY * desired[node], SPACINGS_LITTLE_EMPTY * samples.spacing)
-    which, node, foot = which[empty], node[empty], foot[empty]
+    tips = _pointed_nodes(grid, samples, desired, steep)
+    if not len(tips.node):
+        return tips.node
     points = by_x(samples.measured_points)
-    found, of = np.unique(foot, return_inverse=True)
+    found, of = np.unique(tips.foot, return_inverse=True)
     normals = np.array([_normal(grid.nodes[k], AROUND_END * desired[k], points) for k in found]).reshape(-1, 3)[of]
-    leaves = abs((normals * ways[which]).sum(axis=1)) > steep
-    leaves &= abs((normals * axes[node]).sum(axis=1)) > even * sharp[node]
-    count = np.bincount(node[leaves], minlength=len(grid.nodes))
-    return np.flatnonzero((count >= FEWEST_MEMBERS) & (2 * count >= uses))
+    axes = tips.axes[tips.node]
+    leaves = abs((normals * tips.ways).sum(axis=1)) > steep
+    leaves &= abs((normals * axes).sum(axis=1)) > even * np.linalg.norm(axes, axis=1)
+    return tips.mostly(leaves)
+
+
+def _on_masts(grid: Grid, samples: SurfaceSamples, desired: np.ndarray) -> np.ndarray:
+    """Return the nodes (K,) far up or down a mast or a column from where the sheet meets it, most of whose members cross empty space."""
+    tips = _pointed_nodes(grid, samples, desired, 0.0)
+    nodes = tips.mostly(np.ones(len(tips.node), np.bool_))
+    if not len(nodes):
+        return nodes
+    points, normals = by_x(samples.measured_points), normals_at_nodes(grid)
+    off = [_is_off_along(grid.nodes[node], normals[node], desired[node], points) for node in nodes]
+    return nodes[np.array(off)]
+
+
+def _is_off_along(place: np.ndarray, normal: np.ndarray, length: float, points: np.ndarray) -> bool:
+    """Whether a place lies on a mast that stands across the sheet, and well over or under the edge of the sheet around that.
+
+    Parameters
+    ----------
+    normal : (3,) of the grid there
+    length : desired member length there [scan unit]
+    points : (N, 3), by ascending x
+    """
+    around = points_within(place, AROUND_ON_MAST * length, points)
+    if len(around) < FEWEST_AT_END:
+        return False
+    variances, axes = np.linalg.eigh(np.cov(around.T))
+    axis = axes[:, 2]
+    if variances[1] > THIN_ON_MAST * variances[2] or abs(axis @ normal) < LEANS:
+        return False
+    beside = points_within(place, 2.0 * BESIDE_MAST * length, points) - around.mean(axis=0)
+    height = beside @ axis
+    level = np.sqrt(np.maximum((beside**2).sum(axis=1) - height**2, 0.0))
+    own = WIDTHS_OF_MAST * math.sqrt(variances[1])
+    sheet = (level > own) & (level < BESIDE_MAST * length)
+    if sheet.sum() < FEWEST_AT_END:
+        return True
+    edge = height[sheet & (level < level[sheet].min() + EDGE_AT_MAST * length)]
+    here = float((place - around.mean(axis=0)) @ axis)
+    return bool(np.abs(edge - here).min() > OFF_ALONG_MAST * length)
 
 
 def _middles_away(grid: Grid, samples: SurfaceSamples, which: np.ndarray, desired: np.ndarray) -> np.ndarray:

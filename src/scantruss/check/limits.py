@@ -127,6 +127,8 @@ def mostly_rounded(rounded: float, at: Place) -> list[Fault]:
 def places_to_look_at(found: Certificate, missed_at: Place, rounded: float = 0.0) -> list[Fault]:
     """Return warnings of what a grid leaves out: each place farther than a member, and much that it misses or ScanTruss left out.
 
+    What is said of one of these is not counted again with the others that it misses.
+
     missed_at : the worst place that it misses by less than a member
     rounded : share of the points that lie farther than `ROUNDED_BY` members from the grid, but not so far that it misses them
     """
@@ -136,8 +138,9 @@ def places_to_look_at(found: Certificate, missed_at: Place, rounded: float = 0.0
         for part in found.left_out
         if part.kind == "far" and part.where is not None and part.farthest is not None
     ]
-    if found.missing > WARN_LEFT_OUT:
-        words = f"misses {found.missing:.1%} of the points by more than half a member"
+    listed = sum(part.share for part in found.left_out if part.kind in ("limbs", "slits", "far"))
+    if found.missing - listed > WARN_LEFT_OUT:
+        words = f"misses {found.missing - listed:.1%} of the points by more than half a member"
         warnings.append(Fault("missed", words, missed_at))
     if WARN_LEFT_OUT < rounded <= MOST_ROUNDED:
         words = (

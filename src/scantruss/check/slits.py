@@ -13,6 +13,7 @@ from ..kernels.mesh.coverage import nearest_distances
 from ..runtime.parallel import in_parts
 from ..surface.chosen_samples import KEPT
 from .distances import PLACES_MEASURED_PER_THREAD, boxes_of, heights_over, is_over_holes, normals_of
+from .gaps import POINTS_AROUND_MIDDLE
 from .left_out import points_together
 from .limits import PLACES_KEPT
 
@@ -45,6 +46,8 @@ LONG_MIDDLE = (
 )
 IN_A_ROW = 2.0  # gap between places of one narrow gap [steps between places]
 FEWEST_IN_GAP = 4  # in one gap
+# length up to which a gap is nearly round [widths]: then points must lie around it that make it no accident, as around a round one
+NEARLY_ROUND = 1.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,6 +71,10 @@ class FeetOnGrid:
             ),
         )
         return distance.reshape(places.shape[:-1])
+
+    def within(self, place: np.ndarray, reach: float) -> int:
+        """Return how many points lie within reach of a place (3,)."""
+        return int((((self.points - place) ** 2).sum(axis=1) <= reach * reach).sum())
 
 
 def narrow_gaps(
@@ -118,6 +125,8 @@ def narrow_gaps(
         if along < SLENDER * width and not (half[own] * UNUSUAL > SURELY * least[own]).any():
             continue
         here = places[own] + samples.origin
+        if along < NEARLY_ROUND * width and feet.within(middle, width) < POINTS_AROUND_MIDDLE:
+            continue
         if not any(_holds(each, here) for each in known):
             gaps.append((gap, width))
             parts += [each for each in known if each.kind == "gap" and _lies_in(each, here, width)]

@@ -26,7 +26,7 @@ class Fault:
 
     #: empty manifold orientable pieces loops crossing folded uneven cover torn astray fixed beyond bridged; angle
     #: short long offset unfollowed rounded as fault or warning; of a warning aside, far, left out, gap, closed, hole, zigzag,
-    #: cut, missed, peak, apart, ridge
+    #: cut, missed, peak, apart, ridge, stops, fixed
     kind: str
     words: str
     where: Place | None = None  #: a place in the scan's own frame [scan unit], the worst

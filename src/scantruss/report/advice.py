@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -21,10 +21,10 @@ from ..scan.member_length import exact_range, length_range, round_length, sugges
 from ..surface.samples import sample_surface
 from ..surface.shape import wall_of_surface
 from ..surface.size_field import measured_bends
+from .length_trial import LengthTrial
 
 if TYPE_CHECKING:
     from ..attempts.table import Attempt
-    from ..grid.grid import Grid
     from ..runtime.progress import Progress
     from ..scan.cloud import PointCloud
     from ..settings import Settings
@@ -53,52 +53,23 @@ SURE_PER_SPACING = 8.0
 LENGTH_OF_WALL = 0.8  # of the thickness of a wall: at 1.4 times that, too, both of its sides are kept apart
 MOSTLY_WALL = 0.4  # share of a scan on a thin wall from which on lengths are chosen for that
 LEAST_OF_WALL = 5.0  # least length for a wall, in spacings
+LOST_ALIKE = 0.002  # share of the scan up to which lengths lose as much as one another
 MOST_LOST = 0.01  # share of the scan that may be lost at a length that is suggested
 MOST_TRIED = 20.0  # grids that are made for a suggestion, or to find a length nearby, each counted by its cost
 POINTS_LOOKED_AT = 2_000_000  # points that are looked at for that
 LEAST_TRIED = 5.0  # grids that are made for that even where the scan has more points
 TRIED_AROUND = 6.0  # grids that are made besides for the lengths of the table, one each
 TRIED_LONGER = 2  # grids that are made of each longer length where no other has passed, of those for the table
+BESIDE_USUAL = (
+    1.12,
+    0.9,
+    1.25,
+)  # lengths that are tried then where none of these passes, as multiples of the usual one
 TRIED_USUAL = 4.0  # grids that are made at the usual length where no length nearby passes and it is far away
 FAR_TOO_SHORT = 0.2  # share of the shortest possible length below which the usual one is looked at alone: that length is in another unit
 POINTS_PER_MEMBER = 9  # points that cost as much as a member of the grid
 MOST_MEMBERS = 60_000  # members of a grid that is made to try a length
 CLOSE_BEND = 0.95  # share of the scan that is less bent than the radius that is named
-
-
-@dataclass(frozen=True, eq=False)
-class LengthTrial:
-    """The result of trying a member length."""
-
-    length: float  #: [scan unit]
-    grid: Grid | None  #: with its certificate; None if there is none
-    fault: FrontError | None = None
-    grids: int = 0  #: how many were made
-    paused: bool = False  #: whether more might come of it
-
-    @property
-    def passed(self) -> bool:
-        """Whether there is a grid, and it passes."""
-        return self.grid is not None
-
-    @property
-    def leaves_out(self) -> bool:
-        """Whether the first grid fails as it leaves out too much of the scan."""
-        found = getattr(getattr(self.fault, "grid", None), "certificate", None)
-        return found is not None and any(fault.kind == "cover" for fault in found.faults)
-
-    @property
-    def loses_limbs(self) -> bool:
-        """Whether the first grid fails as limbs are too thin for its members; longer ones lose more."""
-        found = getattr(getattr(self.fault, "grid", None), "certificate", None)
-        return self.leaves_out and found is not None and any(part.kind == "limbs" for part in found.left_out)
-
-    @property
-    def lost(self) -> float:
-        """Share of the scan that the grid does not follow by ScanTruss's own judgement; 1 where there is none."""
-        if self.grid is None or self.grid.certificate is None:
-            return 1.0
-        return self.grid.certificate.judged_out
 
 
 class Advice:
@@ -121,6 +92,7 @@ class Advice:
         self._begun: dict[
             float, tuple[Settings, Iterator[Attempt], AttemptLimit]
         ] = {}  # what is left to try of each length
+        self._spent = 0.0  # grids that were made, each counted by its cost
         self.is_spent = False  #: whether a suggestion was looked for
         self._has_table_grids = True  # whether the grids that the table may cost are not yet made
         self._usual = self._usual_length()
@@ -201,6 +173,7 @@ class Advice:
                 raise  # a setting that suits no length
             fault = fault or (error if isinstance(error, FrontError) else FrontError(str(error)))
         self._left -= cost * (limit.runs - before)
+        self._spent += cost * (limit.runs - before)
         paused = limit.is_paused() and limit.runs > before
         trial = LengthTrial(length, grid, None if grid is not None else fault, limit.runs, paused)
         self._found[length] = trial
@@ -225,9 +198,9 @@ class Advice:
         """Return the length to take.
 
         It is the first of those tried in turn that passes with what is next above it, both without much of the scan lost; else of
-        those that pass with what is next above them the one that loses least; else the next below one that passes, if it passes too;
-        else one that passes, if there is one with another not far above it that passes too; else the usual length. Where none passes,
-        longer ones are looked at once more.
+        those that pass with what is next above them the first that loses hardly more than the least; else the next below one that
+        passes, if it passes too; else one that passes, if there is one with another not far above it that passes too; else the usual
+        length. Where none passes, longer ones are looked at once more, then those beside the usual one.
         """
         self.is_spent = True
         low, high = length_range(self._cloud)
@@ -247,9 +220,12 @@ class Advice:
                 if both[length] <= MOST_LOST:
                     return length
         if both:
-            return min(both, key=lambda length: both[length])
+            least = min(both.values())
+            return next(length for length, lost in both.items() if lost <= least + LOST_ALIKE)
         if not self.passes:
             self._try_longer()
+        if not self.passes:
+            self._try_beside()
         passing = [trial.length for trial in self.tried if trial.passed]
         if passing:
             below = self.next_below(passing[0])
@@ -272,6 +248,17 @@ class Advice:
         for share in LAST_LENGTHS:
             length = min(_two_digits(share * self._usual), length_range(self._cloud)[1])
             trial = self.try_length(length, TRIED_LONGER)
+            if trial is not None and trial.passed:
+                return
+
+    def _try_beside(self) -> None:
+        """Try lengths beside the usual one until one passes, of a scan that leaves grids for it: steps as of the table may miss it."""
+        left = MOST_TRIED + TRIED_AROUND - self._spent
+        if left < FIRST_TWO or LEAST_TRIED * self._cost(self._usual) >= POINTS_LOOKED_AT:
+            return
+        self._count_at(self._usual, min(left, FIRST_TWO * len(BESIDE_USUAL)))
+        for share in BESIDE_USUAL:
+            trial = self.try_length(_two_digits(share * self._usual), FIRST_TWO)
             if trial is not None and trial.passed:
                 return
 

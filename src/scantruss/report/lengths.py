@@ -10,7 +10,8 @@ from ..errors import words_of_number, words_of_place
 
 if TYPE_CHECKING:
     from ..scan.cloud import PointCloud
-    from .advice import Advice, LengthTrial
+    from .advice import Advice
+    from .length_trial import LengthTrial
 
 MOST_WORDS = 2  # kinds of loss, or faults, that are named for a length
 

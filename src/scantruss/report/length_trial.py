@@ -1,0 +1,45 @@
+"""What came of a member length that was tried."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ..errors import FrontError
+    from ..grid.grid import Grid
+
+
+@dataclass(frozen=True, eq=False)
+class LengthTrial:
+    """The result of trying a member length."""
+
+    length: float  #: [scan unit]
+    grid: Grid | None  #: with its certificate; None if there is none
+    fault: FrontError | None = None
+    grids: int = 0  #: how many were made
+    paused: bool = False  #: whether more might come of it
+
+    @property
+    def passed(self) -> bool:
+        """Whether there is a grid, and it passes."""
+        return self.grid is not None
+
+    @property
+    def leaves_out(self) -> bool:
+        """Whether the first grid fails as it leaves out too much of the scan."""
+        found = getattr(getattr(self.fault, "grid", None), "certificate", None)
+        return found is not None and any(fault.kind == "cover" for fault in found.faults)
+
+    @property
+    def loses_limbs(self) -> bool:
+        """Whether the first grid fails as limbs are too thin for its members; longer ones lose more."""
+        found = getattr(getattr(self.fault, "grid", None), "certificate", None)
+        return self.leaves_out and found is not None and any(part.kind == "limbs" for part in found.left_out)
+
+    @property
+    def lost(self) -> float:
+        """Share of the scan that the grid does not follow by ScanTruss's own judgement; 1 where there is none."""
+        if self.grid is None or self.grid.certificate is None:
+            return 1.0
+        return self.grid.certificate.judged_out
