@@ -113,6 +113,7 @@ def structure(values: Namespace) -> None:
     if plot is not None:
         claim(plot, "picture", taken, force=values.force)
     from ..grid.certificate import check_passed
+    from ..structure.doubts import certificate_words
     from ..structure.path_report import encode_path, path_expectation
     from ..structure.truss import Truss
 
@@ -126,20 +127,21 @@ def structure(values: Namespace) -> None:
             return
         weighed = report_place is not None or any(out.suffix.lower() in (".html", ".pdf") for out in outs)
         solution, report = _solved(truss, grid, settings, weighed, bars)
+        of_grid = certificate_words(grid)
         bars("report", 0.0)
         models = [out for out in outs if out.suffix.lower() not in REPORT_SUFFIXES]
         written = write_models(model_of(solution, report=report), models, save, bars)
         for out in outs:
             if out not in models:
-                save.beside(out).write_bytes(_encoded(out, values, settings, solution, report))
+                save.beside(out).write_bytes(_encoded(out, values, settings, solution, report, of_grid))
                 written.append(out)
         if report_place is not None and report_place.suffix.lower() == ".html":
-            save.beside(report_place).write_bytes(_encoded(report_place, values, settings, solution, report))
+            save.beside(report_place).write_bytes(_encoded(report_place, values, settings, solution, report, of_grid))
         elif report_place is not None:
-            save.json(report_place, report.to_dict())
+            save.json(report_place, report.to_dict() | {"warnings_of_grid": of_grid})
         if plot is not None and report.path is not None:
             save.beside(plot).write_bytes(encode_path(report.path))
-    _print_report(report, [*written, *(place for place in (report_place, plot) if place)])
+    _print_report(report, of_grid, [*written, *(place for place in (report_place, plot) if place)])
 
 
 def _solved(
@@ -173,7 +175,7 @@ def _solved(
     return solution, report_structure(solution, settings.checks, doubts_of_settings(settings, grid), **found)
 
 
-def _print_report(report: StructureReport, wrote: Sequence[Path]) -> None:
+def _print_report(report: StructureReport, of_grid: Sequence[str], wrote: Sequence[Path]) -> None:
     """Print the table of a structure, its lines, its warnings and the files that were written."""
     from ..report.terminal import print_lines, print_table
     from ..structure.doubts import support_words
@@ -209,13 +211,29 @@ def _print_report(report: StructureReport, wrote: Sequence[Path]) -> None:
                 else ["the stability of the whole is not looked at; --buckling 1 does"]
             ),
             *(f"warning: {words}" for words in report.warnings),
+            *_line_of_grid(of_grid),
             f"wrote {' '.join(map(str, wrote))}",
         ]
     )
 
 
+def _line_of_grid(of_grid: Sequence[str]) -> list[str]:
+    """Return one line on the faults and warnings of the certificate of the grid, of which a report lists all."""
+    if len(of_grid) < 2:
+        return [f"warning: {words}" for words in of_grid]
+    first = of_grid[0].partition(" (near ")[0]
+    return [
+        f"warning: the certificate of the grid has {len(of_grid)} warnings, all in a report (.html, .pdf): {first}, ..."
+    ]
+
+
 def _encoded(
-    out: Path, values: Namespace, settings: StructureSettings, solution: Solution, report: StructureReport
+    out: Path,
+    values: Namespace,
+    settings: StructureSettings,
+    solution: Solution,
+    report: StructureReport,
+    of_grid: Sequence[str],
 ) -> bytes:
     """Return what a report or a picture of the structure holds."""
     from ..report.structural.contents import overview_picture, report_parts
@@ -231,7 +249,8 @@ def _encoded(
     from ..report.structural.html import encode_html
     from ..report.structural.pdf import encode_pdf
 
-    parts = report_parts(ReportSource(Path(values.grid).name, _command_line(values), settings, solution, report))
+    source = ReportSource(Path(values.grid).name, _command_line(values), settings, solution, report, of_grid)
+    parts = report_parts(source)
     if out.suffix.lower() == ".pdf":
         return encode_pdf(parts)
     return encode_html(parts, encode_page(model_of(solution, report=report), FileStyle()))
