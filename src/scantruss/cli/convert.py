@@ -78,6 +78,7 @@ def convert(values: Namespace) -> None:
     )
     taken = {Path(values.source).resolve(): "file that is read"}
     claim_models(outs, taken, force=values.force)
+    there = [str(out) for out in outs if out.is_file() and out.stat().st_size]
     with Bars() as bars, SaveTogether("" if values.force else "result") as save:
         bars("read", 0.0)
         check_drawing_passed(values.source, values.keep_failed)
@@ -97,7 +98,8 @@ def convert(values: Namespace) -> None:
         written = write_models(model, outs, save, bars, style)
     panels = "panels" if model.grid is None else model.grid.panels_are
     size = f"{len(model.local):,} nodes, {len(model.members):,} members, {len(model.panels):,} {panels}"
-    print_lines([size, f"wrote {' '.join(map(str, written))}"])
+    replaced = [f"in place of what ScanTruss wrote there before: {' '.join(there)}"] if there else []
+    print_lines([size, f"wrote {' '.join(map(str, written))}", *replaced])
 
 
 def claim_models(outs: list[Path], taken: Taken, *, force: bool, what: str = "result") -> None:
