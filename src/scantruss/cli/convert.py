@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from .grids import add_grid, check_drawing_passed
 from .outputs import Taken, claim, outs_of
+from .styles import add_styles, style_of
 
 if TYPE_CHECKING:
     from ..export.model import Model
@@ -55,6 +56,7 @@ def convert_parser() -> Parser:
         "--system", metavar="EPSG:CODE", help="reference system, for .geojson and .ifc, of a scan that names none"
     )
     parser.add_argument("--keep-failed", action="store_true", help="also accept a grid that failed its certificate")
+    add_styles(parser)
     return parser
 
 
@@ -62,13 +64,13 @@ def convert(values: Namespace) -> None:
     """Write what a file holds in other formats."""
     from ..export.formats import GRID, STRUCTURE, check_output, read_model
     from ..export.model import with_system, with_unit
-    from ..export.style import FileStyle
     from ..grid.certificate import check_passed
     from ..report.terminal import Bars, print_lines
     from ..runtime.files import SaveTogether
 
     outs = [check_output(out, "") for out in outs_of(values)]
-    style = FileStyle(
+    style = style_of(
+        values,
         tube=values.tube,
         ball=values.ball,
         ifc=values.ifc,

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from ..errors import InputError
 from .grids import add_grid, read_grid_or_structure
 from .outputs import claim, outs_of, wrote_line
+from .styles import add_decimal_comma
 
 if TYPE_CHECKING:
     from .options import Parser
@@ -90,6 +91,7 @@ def schedule_parser() -> Parser:
     parser.add_argument(
         "--slenderness", metavar="X", type=number, help="for a structure: warn of more slender members (default 200)"
     )
+    add_decimal_comma(parser)
     parser.add_argument("--keep-failed", action="store_true", help="also accept a grid that failed its certificate")
     return parser
 
@@ -144,5 +146,5 @@ def make_schedule(values: Namespace) -> None:
         files: dict[Path, int] = {}
         for number, out in enumerate(outs):
             bars("write", number / len(outs))
-            files[out] = len(write_schedules(made, save.beside(out)))
+            files[out] = len(write_schedules(made, save.beside(out), decimal_comma=values.decimal_comma))
     print_lines([*schedule_lines(made, settings, what.alike), wrote_line(files)])

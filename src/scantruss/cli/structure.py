@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import InputError
 from .grids import add_grid, read_saved_grid
 from .outputs import Taken, claim, outs_of
+from .styles import add_decimal_comma
 
 if TYPE_CHECKING:
     import numpy as np
@@ -82,6 +83,7 @@ def structure_parser() -> Parser:
     for name, metavar, about in OWN_OPTIONS:
         kind = {"NUMBER": number, "COUNT": whole_number, "SCALE": scale, "SHARE": share}.get(metavar, str)
         parser.add_argument("--" + name.replace("_", "-"), metavar=metavar, type=kind, default=SUPPRESS, help=about)
+    add_decimal_comma(parser)
     parser.add_argument("--path-plot", metavar="FILE.png", help="picture of the path: load factor against displacement")
     parser.add_argument(
         "--dry-run", action="store_true", help="print the size and time of the path without computing it"
@@ -93,6 +95,7 @@ def structure_parser() -> Parser:
 def structure(values: Namespace) -> None:
     """Make the structure of a saved grid, solve it and save it."""
     from ..export.formats import STRUCTURE, check_output, model_of
+    from ..export.style import FileStyle
     from ..report.terminal import Bars, print_lines
     from ..runtime.files import SaveTogether
     from ..runtime.places import check_place
@@ -130,7 +133,9 @@ def structure(values: Namespace) -> None:
         of_grid = certificate_words(grid)
         bars("report", 0.0)
         models = [out for out in outs if out.suffix.lower() not in REPORT_SUFFIXES]
-        written = write_models(model_of(solution, report=report), models, save, bars)
+        written = write_models(
+            model_of(solution, report=report), models, save, bars, FileStyle(decimal_comma=values.decimal_comma)
+        )
         for out in outs:
             if out not in models:
                 save.beside(out).write_bytes(_encoded(out, values, settings, solution, report, of_grid))
@@ -262,7 +267,7 @@ def _command_line(values: Namespace) -> str:
     for name in ("settings", "report", "path_plot", *(name for name, _, _ in OWN_OPTIONS)):
         if vars(values).get(name) is not None:
             words += [f"--{name.replace('_', '-')}", f"{vars(values)[name]}"]
-    return shlex.join([*words, *["--keep-failed"] * values.keep_failed])
+    return shlex.join([*words, *["--decimal-comma"] * values.decimal_comma, *["--keep-failed"] * values.keep_failed])
 
 
 def _path(truss: Truss, settings: StructureSettings, progress: Progress) -> StructurePath:

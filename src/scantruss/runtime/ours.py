@@ -48,7 +48,11 @@ def kind_of_ours(path: Path) -> str:
     text = head.replace(b"\x00", b"")  # numpy keeps text in four bytes a letter
     if b"point cloud by ScanTruss" in text or (text.startswith(b"LASF") and b"ScanTruss" in text):
         return "cloud"
-    return "result" if re.search(rb"ScanTruss \d|scantruss-grid", text) or TABLE_HEADS.match(text) else ""
+    return (
+        "result"
+        if re.search(rb"ScanTruss \d|scantruss-grid", text) or TABLE_HEADS.match(text.replace(b";", b","))
+        else ""
+    )
 
 
 def check_ours(path: Path, kind: str, replace: str = FORCE_OPTION) -> None:
