@@ -9,6 +9,8 @@ from rough import Rough, rough_disc, rough_sphere, same_topology
 from steps import boundary_of, optimized
 
 from scantruss import Grid, InputError, PointCloud, Settings
+from scantruss.boundary.find import find_boundary
+from scantruss.constraints.find import find_constraints
 from scantruss.constraints.fixed_nodes import check_fixed_positions
 from scantruss.surface.samples import sample_surface
 
@@ -156,3 +158,31 @@ def test_a_position_off_the_scan_comes_with_the_nearest_point() -> None:
         check_fixed_positions([far.tolist()], sample_surface(cloud, settings), settings.length)
     named = np.array([float(word) for word in str(refused.value).rsplit("(", 1)[1].rstrip(")").split(",")])
     assert np.allclose(named, points[np.linalg.norm(points - far, axis=1).argmin()], atol=1e-6)
+
+
+@pytest.mark.parametrize("far", [0.0, 2683400.0])
+@pytest.mark.parametrize("factor", [1000.0, 0.3048, 1 / 0.3048, 10.0])
+def test_places_in_another_unit_are_told_of_with_the_nearest_point(factor: float, far: float) -> None:
+    side = np.linspace(0.0, 24.0, 80)
+    x, y = (each.ravel() for each in np.meshgrid(side, side))
+    scan = np.column_stack([x + far, y + far, 6.0 + 0.02 * x * y])
+    samples = sample_surface(PointCloud.from_array(scan, unit="m"), Settings(length=2.0, unit="m"))
+    places = scan[[700, 3000, 6000]]
+    with pytest.raises(InputError) as raised:
+        check_fixed_positions(places * factor, samples, 2.0)
+    said = str(raised.value)
+    assert "the nearest point is (" in said
+    assert f"times {1 / factor:.5g} all that are given lie at the scan: give them in the unit of the scan, m" in said
+    settings = Settings(length=2.0, unit="m", fixed_lines=[(places * factor).tolist()])
+    with pytest.raises(InputError, match=r"fixed line 1.*nearest point is .*times .* lie at the scan"):
+        find_constraints(*find_boundary(samples, settings), settings)
+
+
+def test_a_place_that_no_unit_brings_to_the_scan_is_not_suspected_of_one() -> None:
+    side = np.linspace(-12.0, 12.0, 80)
+    x, y = (each.ravel() for each in np.meshgrid(side, side))
+    cloud = PointCloud.from_array(np.column_stack([x, y, 0.0 * x]))
+    samples = sample_surface(cloud, Settings(length=2.0))
+    with pytest.raises(InputError) as raised:
+        check_fixed_positions([(0.0, 0.0, 9.0)], samples, 2.0)
+    assert "times" not in str(raised.value)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import Place
+from ..errors import Place, words_of_number
 from ..grid.certificate import Certificate, Fault, place_of
 from ..grid.panels import inner_angles_of
 from ..settings import CheckSettings
@@ -132,7 +132,11 @@ def places_to_look_at(found: Certificate, missed_at: Place, rounded: float = 0.0
     """
     unit = f" {found.unit}" if found.unit else ""
     warnings = [
-        Fault("far", f"misses {part.points:,} points ({part.share:.2%}) by up to {part.farthest:.3g}{unit}", part.where)
+        Fault(
+            "far",
+            f"misses {part.points:,} points ({part.share:.2%}) by up to {words_of_number(part.farthest, 3)}{unit}",
+            part.where,
+        )
         for part in found.left_out
         if part.kind == "far" and part.where is not None and part.farthest is not None
     ]

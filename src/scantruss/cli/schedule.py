@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -102,7 +103,11 @@ def tube(text: str) -> tuple[float, float | None]:
     try:
         return float(diameter), float(wall) if times else None
     except ValueError:
-        raise argparse.ArgumentTypeError(f"needs a diameter and a wall in mm such as 114.3x5, got {text!r}") from None
+        point = re.sub(r"(?<=\d),(?=\d)", ".", text)
+        meant = f"; write {point} with a point" if point != text else ""
+        raise argparse.ArgumentTypeError(
+            f"needs a diameter and a wall in mm such as 114.3x5, got {text!r}{meant}"
+        ) from None
 
 
 def ball(text: str) -> float | None:
