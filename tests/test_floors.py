@@ -19,16 +19,20 @@ def barrel_on_a_floor(rng: np.random.Generator) -> np.ndarray:
     return np.concatenate([barrel, floor]) + rng.normal(0, 0.005, (23_000, 3))
 
 
+@pytest.mark.parametrize("unit", ["m", ""])
 def test_a_barrel_on_its_floor_is_refused_with_the_crop_that_passes(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    unit: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """Only "clean or crop the scan where it fails" was said, and to accept that two thirds are missing."""
     scan, out = tmp_path / "barrel.npy", tmp_path / "grid.json"
     np.save(scan, barrel_on_a_floor(np.random.default_rng(1)) + (500, 200, 80))
-    words = ["grid", str(scan), str(out), "--length", "3", "--unit", "m", "--effort", "quick", "--quiet"]
+    words = ["grid", str(scan), str(out), "--length", "3", "--effort", "quick", "--quiet"]
+    words += ["--unit", unit] if unit else []
     assert main(words) == 3 and not out.exists()
     said = capsys.readouterr().err
-    crop = re.search(r"level floor at a height of ([0-9.]+) m: without it, --crop (box:[-0-9.,]+), a grid passes", said)
+    crop = re.search(
+        r"level floor at a height of ([0-9.]+)(?: m)?: without it, --crop (box:[-0-9.,]+), a grid passes", said
+    )
     assert crop is not None and "--allow-missing" not in said
     assert float(crop[1]) == pytest.approx(80.0, abs=0.1)
     assert main([*words, "--crop", crop[2]]) == 0

@@ -15,7 +15,7 @@ from .check.certify import MOST_ACCEPTED
 from .check.crossings import MOST_CROSSINGS
 from .constraints.find import ridges_away_from
 from .constraints.ridges import find_ridges
-from .errors import CertificateError, FrontError, OneSidedError, ScanTrussError
+from .errors import CertificateError, FrontError, OneSidedError, ScanTrussError, words_of_place
 from .front.orientation_field import FieldStart
 from .settings import SAMPLE_SPACING
 from .surface.chosen_samples import ROD
@@ -24,6 +24,7 @@ from .surface.sharp_edges import EDGE_SHARE, FEWEST_NEEDED
 from .surface.supports import are_columns
 
 if TYPE_CHECKING:
+    from .grid.certificate import Certificate
     from .grid.grid import Grid
     from .scan.cloud import PointCloud
     from .settings import Settings
@@ -86,10 +87,18 @@ class Attempt:
         allowing = f"--allow-missing {math.ceil(100.0 * found.missing) / 100.0:g}"
         if self.settings.smooth_scale and found.missing <= MOST_ACCEPTED:
             smooth = f"--smooth-scale {self.settings.smooth_scale:g} --ridge-angle 0"
-            return f"with {smooth} {allowing} a grid of its mean surface passes"
+            return f"with {smooth} {allowing} a grid of its mean surface passes, {_dropping(found)}"
         if self.settings.plain_body and found.missing <= FAR_MISSING * self.settings.allow_missing:
-            return f"with --plain-body {allowing} a grid without its thin limbs passes"
+            return f"with --plain-body {allowing} a grid without its thin limbs passes, {_dropping(found)}"
         return ""
+
+
+def _dropping(found: Certificate) -> str:
+    """Say how much of the scan a grid leaves out that only leaves out too much, and where most of that is."""
+    own = [part for part in found.left_out if part.points and part.where is not None and not part.asked]
+    most = max(own, key=lambda part: part.points, default=None)
+    at = "" if most is None or most.where is None else f", most of it near ({words_of_place(most.where)})"
+    return f"but {found.missing:.0%} of the scan is not in it{at}"
 
 
 def attempts(cloud: PointCloud, settings: Settings) -> Iterator[Attempt]:

@@ -31,6 +31,7 @@ ROUNDED_BY = 0.25  # distance from the grid above which a point is rounded off [
 # share of the points that are rounded off above which it is a fault: 0.23 where nodes jump between two layers, 0.16 at most on others
 MOST_ROUNDED = 0.2
 # share of the points that a grid may miss or round off, and ScanTruss may leave out by itself, without a word
+SAID_ALONE = ("far", "limbs", "slits")  # kinds of what a grid misses that are listed with their own counts
 WARN_LEFT_OUT = 0.01
 
 
@@ -140,8 +141,9 @@ def places_to_look_at(found: Certificate, missed_at: Place, rounded: float = 0.0
         for part in found.left_out
         if part.kind == "far" and part.where is not None and part.farthest is not None
     ]
-    if found.missing > WARN_LEFT_OUT:
-        words = f"misses {found.missing:.1%} of the points by more than half a member"
+    farther = sum(part.share for part in found.left_out if part.kind in SAID_ALONE)
+    if (nearer := found.missing - farther) > WARN_LEFT_OUT:
+        words = f"misses {nearer:.1%} of the points by {'half a member to a member' if farther else 'more than half a member'}"
         warnings.append(Fault("missed", words, missed_at))
     if WARN_LEFT_OUT < rounded <= MOST_ROUNDED:
         words = (

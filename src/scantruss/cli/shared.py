@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from ..scan.cloud import PointCloud
     from ..scan.stream.thin_scan import Thinned
     from ..settings import Settings
+    from ..surface.samples import SurfaceSamples
     from .options import Parser
 
 MOST_PIECES = 5  # pieces that are named one by one
@@ -169,6 +170,13 @@ def box_around(low: np.ndarray, high: np.ndarray, margin: float) -> str:
     return ",".join(f"{c:.{decimals}f}" for c in (*low - margin, *high + margin))
 
 
+def _has_floor(samples: SurfaceSamples, length: float) -> bool:
+    """Whether one of the pieces would be taken for a floor if z were known to be up."""
+    from ..surface.floor import find_floor
+
+    return find_floor(samples.surface.mean, samples.piece, tuple(samples.pieces), length) is not None
+
+
 def note_pieces(bars: Bars, cloud: PointCloud, settings: Settings) -> None:
     """List the pieces of a scan with their sizes, and how to take one alone; nothing if there is only one.
 
@@ -183,6 +191,10 @@ def note_pieces(bars: Bars, cloud: PointCloud, settings: Settings) -> None:
         return
     if samples.floor is not None:
         bars.note("a level, flat piece under the others is taken for the floor and left out; --piece all keeps it")
+    elif not cloud.z_is_up and settings.piece == "auto" and _has_floor(samples, settings.length):
+        bars.note(
+            "a level, flat piece lies under the others, as a floor does; where the unit is m or foot it is left out, as z is up then"
+        )
     unit = f" {cloud.unit}" if cloud.unit else ""
     large = sorted({*samples.pieces, *samples.not_chosen})
     all_places = samples.surface.mean + cloud.origin

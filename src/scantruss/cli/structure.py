@@ -216,20 +216,18 @@ def _print_report(report: StructureReport, of_grid: Sequence[str], wrote: Sequen
                 else ["the stability of the whole is not looked at; --buckling 1 does"]
             ),
             *(f"warning: {words}" for words in report.warnings),
-            *_line_of_grid(of_grid),
+            *_line_of_grid(of_grid, listed=any(place.suffix.lower() in (".html", ".pdf") for place in wrote)),
             f"wrote {' '.join(map(str, wrote))}",
         ]
     )
 
 
-def _line_of_grid(of_grid: Sequence[str]) -> list[str]:
-    """Return one line on the faults and warnings of the certificate of the grid, of which a report lists all."""
+def _line_of_grid(of_grid: Sequence[str], *, listed: bool) -> list[str]:
+    """Return one line on the faults and warnings of the certificate of the grid; listed: whether a report was written, with all."""
     if len(of_grid) < 2:
         return [f"warning: {words}" for words in of_grid]
-    first = of_grid[0].partition(" (near ")[0]
-    return [
-        f"warning: the certificate of the grid has {len(of_grid)} warnings, all in a report (.html, .pdf): {first}, ..."
-    ]
+    first, where = of_grid[0].partition(" (near ")[0], "the report" if listed else "a report (.html, .pdf)"
+    return [f"warning: the certificate of the grid has {len(of_grid)} warnings, all in {where}: {first}, ..."]
 
 
 def _encoded(
