@@ -14,6 +14,7 @@ from ..errors import unit_words, words_of_number
 if TYPE_CHECKING:
     import numpy as np
 
+    from ..grid.certificate import Certificate
     from ..report.terminal import Bars
     from ..scan.cloud import PointCloud
     from ..scan.stream.thin_scan import Thinned
@@ -113,8 +114,13 @@ def read_thinned_scan(path: str, settings: Settings, bars: Bars) -> PointCloud:
     return cloud
 
 
-def note_outliers(bars: Bars, cloud: PointCloud, settings: Settings, command: str = "") -> None:
-    """Report points that were left out of the scan, and the option that keeps them; `command` is named if it is of another command."""
+def note_outliers(
+    bars: Bars, cloud: PointCloud, settings: Settings, command: str = "", listed: Certificate | None = None
+) -> None:
+    """Report points that were left out of the scan, and the option that keeps them; `command` is named if it is of another command.
+
+    listed : certificate that lists the pieces that were left out, if there is one: they may hang on a limb
+    """
     from ..surface.samples import sample_surface
 
     samples = sample_surface(cloud, settings)
@@ -124,7 +130,7 @@ def note_outliers(bars: Bars, cloud: PointCloud, settings: Settings, command: st
     if samples.outliers:
         bars.note(f"{samples.outliers:,} outliers are left out; {say}--outlier-distance 0 keeps them")
     pieces, share = samples.left_out
-    if pieces:
+    if pieces and listed is None:
         bars.note(
             f"{pieces:,} {'piece' if pieces == 1 else 'pieces'}, {100 * share:.2g} % of the scanned surface, left out:"
             " too small for this length or compared with the others"
