@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from marks import compiled_only
 
 from scantruss.cli.main import main
 from scantruss.surface.supports import floor_below
@@ -47,3 +48,18 @@ def test_a_roof_alone_and_one_over_a_slope_have_no_floor() -> None:
     assert floor_below(np.concatenate([roof, slope]), 1.5) is None
     found = floor_below(np.concatenate([roof, np.column_stack([x, y, 0.0 * x])]), 1.5)
     assert found == pytest.approx(0.0, abs=0.01)
+
+
+@compiled_only
+@pytest.mark.parametrize(("unit", "said"), [("m", "is taken for the floor"), ("mm", "as a floor does")])
+def test_a_level_piece_under_a_roof_is_told_of_in_any_unit(
+    unit: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rng = np.random.default_rng(3)
+    x, y = rng.uniform(-10, 10, (2, 9000))
+    roof, floor = np.column_stack([x, y, 8 - 0.03 * x * x]), np.column_stack([x, y, 0.0 * x])
+    np.save(tmp_path / "hall.npy", np.concatenate([roof, floor]))
+    words = ["grid", str(tmp_path / "hall.npy"), str(tmp_path / "out.json"), "--length", "2", "--effort", "quick"]
+    assert main([*words, "--unit", unit]) == 0
+    told = capsys.readouterr().err
+    assert said in told and told.count("a level, flat piece") == 1
