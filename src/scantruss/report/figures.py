@@ -207,9 +207,9 @@ def left_out_lines(certificate: Certificate) -> list[str]:
         size = f"{words_of_number(part.size or 0.0, 3)}{unit} {'long' if part.kind == 'limbs' else 'across'}"
         place = "" if part.where is None else f", near ({words_of_place(part.where)}), {size}"
         place = f", up to {words_of_number(part.size or 0.0, 3)}{unit} across" if part.number > 1 else place
-        count = f"{part.points:,} points ({part.share:.2%}): " if part.points else ""
-        asked = " as asked for" if part.asked else ""
-        lines.append(f"left out{asked}: {count}{part.words}{place}" if count else f"{part.words}{place}")
+        count = f"{part.points:,} points ({part.share:.2%}) " if part.points else ""
+        asked = ", as asked for" if part.asked else ""
+        lines.append(f"left out: {count}{part.words}{asked}{place}" if count else f"{part.words}{place}")
     return lines
 
 
