@@ -355,6 +355,6 @@ def test_the_verdict_says_how_much_was_left_out_as_asked_for() -> None:
     found = Certificate("mm", 1.0, True, True, 1, 1, 1, 1, 1, 0, points=37_161, left_out=(crop,))
     assert "27.16% of the scan left out as asked for" in str(found)
     assert left_out_lines(found) == [
-        "left out: 13,856 points (27.16%) outside the box, as asked for, near (1, 2, 3), 1,460 mm across"
+        "left out: 13,856 points (27.16%) outside the box, near (1, 2, 3), 1,460 mm across, as asked for"
     ]
     assert "asked" not in str(replace(found, left_out=()))

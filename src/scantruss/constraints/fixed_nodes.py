@@ -11,7 +11,7 @@ from ..surface.samples import SurfaceSamples, distance_from_scan, local_field
 
 #: ratios of units, and theirs of feet and inches: places in one of them are read as in another
 OTHER_UNITS = (10.0, 100.0, 1000.0, 0.1, 0.01, 0.001, 0.3048, 1 / 0.3048, 25.4, 1 / 25.4, 12.0, 1 / 12.0)
-FAR_FROM_ZERO = 2.0  # distance of a scan from zero at which its box tells units apart [its size]
+FAR_SCAN = 2.0  # distance of a scan from zero at which its box tells units apart [its size]
 
 
 def check_fixed_positions(
@@ -66,7 +66,7 @@ def _suit(places: np.ndarray, samples: SurfaceSamples, length: float) -> bool:
     """
     low, high = samples.measured_points.min(axis=0), samples.measured_points.max(axis=0)
     relative = places - samples.origin
-    if np.linalg.norm(samples.origin + 0.5 * (low + high)) > FAR_FROM_ZERO * np.linalg.norm(high - low):
+    if np.linalg.norm(samples.origin + 0.5 * (low + high)) > FAR_SCAN * np.linalg.norm(high - low):
         return bool(((relative >= low - length) & (relative <= high + length)).all())
     if np.linalg.norm(places, axis=1).max() <= length:
         return False

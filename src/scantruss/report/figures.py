@@ -209,7 +209,7 @@ def left_out_lines(certificate: Certificate) -> list[str]:
         place = f", up to {words_of_number(part.size or 0.0, 3)}{unit} across" if part.number > 1 else place
         count = f"{part.points:,} points ({part.share:.2%}) " if part.points else ""
         asked = ", as asked for" if part.asked else ""
-        lines.append(f"left out: {count}{part.words}{asked}{place}" if count else f"{part.words}{place}")
+        lines.append(f"left out: {count}{part.words}{place}{asked}" if count else f"{part.words}{place}")
     return lines
 
 
