@@ -26,6 +26,7 @@ BAR_SHARE = 0.18  # largest share of the width that a scale bar takes
 UNPLACED_SIGN = "!"  # before the words of a fault or warning that is marked at no place
 RING_SIZE, SMALL_RING_SIZE = 1.6, 0.8  # diameters of a ring at the worst place of a kind, and at further ones [em]
 NUMBER_TURNS = (0.65, -0.65, 2.5, -2.5, 1.57, -1.57, 0.0, 3.14)  # directions in which a number may stand beside a ring
+NEAR_NUMBER = 1.6  # distance of a small ring from its number beside another ring, that stands for both [em]
 LEAST_APART = 0.9  # between two numbers, and between a number and a ring of another place [em]
 
 
@@ -156,7 +157,10 @@ def rows_of_marks(grid: Grid) -> list[Row]:
 
 
 def rings_and_numbers(grid: Grid, camera: Camera, em: float) -> tuple[list[Ring], list[Text]]:
-    """Return a ring at each place to look at, small at further places of a kind, and its number beside each."""
+    """Return a ring at each place to look at, small at further places of a kind, and its number beside each.
+
+    Small rings that lie together share a number.
+    """
     rings: list[Ring] = []
     words: list[str] = []
     for number, mark in enumerate(places_marked(grid), 1):
@@ -167,6 +171,9 @@ def rings_and_numbers(grid: Grid, camera: Camera, em: float) -> tuple[list[Ring]
     texts: list[Text] = []
     for ring, word in zip(rings, words, strict=True):
         small = ring.size < RING_SIZE * em
+        near = [text for text in texts if math.hypot(text.x - ring.x, text.y - ring.y) < NEAR_NUMBER * em]
+        if small and any(text.words == word for text in near):
+            continue
         x, y = _beside(ring, rings, texts, em)
         texts.append(Text(x, y, word, (0.8 if small else 1.0) * em, colour=ring.colour, over=True))
     return rings, texts
