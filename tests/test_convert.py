@@ -163,6 +163,7 @@ def test_a_grid_without_a_unit_is_refused_once_the_scan_is_read(
         ("--tube 60", "such as 60x3"),
         ("--tube 60x31", "such as 60x3"),
         ("--tube thick", "needs a diameter and a wall"),
+        ("--tube 60,3x3", "write 60.3x3 with a point"),
         ("--ball -3", "diameter of the balls"),
         ("--ifc parts", "an IFC file holds"),
         ("--tube 60x3 --ball 100000", "shorter than its balls"),

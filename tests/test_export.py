@@ -287,7 +287,7 @@ def test_a_full_disk_leaves_what_was_there(full_at: int, tmp_path: Path, monkeyp
 
     monkeypatch.setattr(Path, "open", open_on_a_full_disk)
     with pytest.raises(st.FormatError, match="No space left on device"):
-        st.write(fan(), tmp_path / "a.csv")
+        st.write(fan(), tmp_path / "a.csv", force=True)
     assert sorted(tmp_path.iterdir()) == paths
     assert [path.read_bytes() for path in paths] == [b"old", b"old"]
 

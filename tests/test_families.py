@@ -6,6 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from marks import compiled_only
+from small_clouds import sheet
 from small_grids import dome, make_grid, uneven
 
 import scantruss as st
@@ -136,3 +138,15 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: py
     assert "--scan SCAN checks it again" in capsys.readouterr().out
     assert main("families none.json out2.json".split()) == 2 and main("families grid.json grid.json".split()) == 2
     assert main("families grid.json out2.json --tolerance x".split()) == 2 and not Path("out2.json").exists()
+
+
+@compiled_only
+def test_the_verdict_on_the_new_grid_is_said_at_the_end(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    points = sheet(12, 8, 0.2)
+    points[:, 2] = 0.01 * points[:, 0] ** 2
+    np.savetxt(tmp_path / "roof.xyz", points)
+    grid, out = str(tmp_path / "grid.json"), str(tmp_path / "few.json")
+    st.write(st.grid_from_scan(tmp_path / "roof.xyz", st.Settings(length=1.5, effort="quick")), grid)
+    assert main(["families", grid, out, "--scan", str(tmp_path / "roof.xyz"), "--keep-failed"]) == 0
+    *_, verdict, wrote = (line for line in capsys.readouterr().out.splitlines() if not line.startswith("warning"))
+    assert verdict == f"certificate: {st.read_grid(out).certificate}" and wrote == f"wrote {out}"

@@ -27,7 +27,16 @@ def test_angles_are_those_of_textbooks(nodes: np.ndarray) -> None:
 
 @pytest.mark.parametrize(
     ("value", "digits", "words"),
-    [(1441.2, 3, "1440"), (17984.6, 4, "17980"), (3.14159, 3, "3.14"), (1e-5, 3, "1e-05"), (2.5e10, 3, "2.5e+10")],
+    [
+        (1441.2, 3, "1,440"),
+        (1720.4, 4, "1,720"),
+        (-17984.6, 4, "-17,980"),
+        (1234.56, 6, "1,234.56"),
+        (999.96, 4, "1,000"),
+        (3.14159, 3, "3.14"),
+        (1e-5, 3, "1e-05"),
+        (2.5e10, 3, "2.5e+10"),
+    ],
 )
 def test_numbers_for_readers_have_a_power_of_ten_only_where_they_are_huge(
     value: float, digits: int, words: str

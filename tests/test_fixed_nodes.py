@@ -10,6 +10,8 @@ from small_clouds import sheet
 from steps import boundary_of, optimized
 
 from scantruss import Grid, InputError, PointCloud, Settings, grid_from_points
+from scantruss.boundary.find import find_boundary
+from scantruss.constraints.find import find_constraints
 from scantruss.constraints.fixed_nodes import check_fixed_positions
 from scantruss.grid.marks import node_marks
 from scantruss.surface.samples import sample_surface
@@ -174,3 +176,31 @@ def test_a_fixed_node_off_the_scan_is_a_warning_with_its_mark(height: float, wor
         (node,) = np.flatnonzero(grid.fixed)
         assert found[0].words == f"has its node {node_marks(grid)[node]} {words}"
         assert found[0].where == pytest.approx((0.3, 0.2, height))
+
+
+@pytest.mark.parametrize("far", [0.0, 2683400.0])
+@pytest.mark.parametrize("factor", [1000.0, 0.3048, 1 / 0.3048, 10.0])
+def test_places_in_another_unit_are_told_of_with_the_nearest_point(factor: float, far: float) -> None:
+    side = np.linspace(0.0, 24.0, 80)
+    x, y = (each.ravel() for each in np.meshgrid(side, side))
+    scan = np.column_stack([x + far, y + far, 6.0 + 0.02 * x * y])
+    samples = sample_surface(PointCloud.from_array(scan, unit="m"), Settings(length=2.0, unit="m"))
+    places = scan[[700, 3000, 6000]]
+    with pytest.raises(InputError) as raised:
+        check_fixed_positions(places * factor, samples, 2.0)
+    said = str(raised.value)
+    assert "the nearest point is (" in said
+    assert f"times {1 / factor:.5g} all that are given lie at the scan: give them in the unit of the scan, m" in said
+    settings = Settings(length=2.0, unit="m", fixed_lines=[(places * factor).tolist()])
+    with pytest.raises(InputError, match=r"fixed line 1.*nearest point is .*times .* lie at the scan"):
+        find_constraints(*find_boundary(samples, settings), settings)
+
+
+def test_a_place_that_no_unit_brings_to_the_scan_is_not_suspected_of_one() -> None:
+    side = np.linspace(-12.0, 12.0, 80)
+    x, y = (each.ravel() for each in np.meshgrid(side, side))
+    cloud = PointCloud.from_array(np.column_stack([x, y, 0.0 * x]))
+    samples = sample_surface(cloud, Settings(length=2.0))
+    with pytest.raises(InputError) as raised:
+        check_fixed_positions([(0.0, 0.0, 9.0)], samples, 2.0)
+    assert "times" not in str(raised.value)

@@ -201,3 +201,21 @@ def test_of_many_small_holes_the_largest_are_listed_and_the_others_counted() -> 
     assert (
         line.startswith("2.0% of the scan, 500 of 25,000 points, is not in the grid: outliers") and "hole" not in line
     )
+
+
+@compiled_only
+def test_a_hole_that_was_asked_to_be_closed_is_not_warned_of_but_another_is() -> None:
+    rng = np.random.default_rng(5)
+    plate = np.column_stack([rng.uniform(-8, 8, (16_000, 2)), np.zeros(16_000)])
+    for middle in ((-3.0, 0.0), (3.0, 1.0)):
+        plate = plate[np.linalg.norm(plate[:, :2] - middle, axis=1) > 0.42]
+    settings = st.Settings(length=1.0, effort="quick")
+
+    def closed(settings: st.Settings) -> set[tuple[float, ...]]:
+        found = known(st.grid_from_points(plate, settings).certificate)
+        said = [warning for warning in found.warnings if warning.kind == "closed"]
+        return {tuple(np.round(place[:2])) for fault in said for place in (fault.where, *fault.also) if place}
+
+    assert closed(settings) == {(-3.0, 0.0), (3.0, 1.0)}
+    assert closed(settings.replace(fill_at=[(3.42, 1.0, 0.0)])) == {(-3.0, 0.0)}
+    assert closed(settings.replace(fill_at=[(3.42, 1.0, 0.0), (-3.0, 0.42, 0.0)])) == set()

@@ -1,14 +1,18 @@
 """The mean surface of a rough scan, and how far nodes lie from the points around them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from shapes import make
 from small_clouds import cap, sheet
+from small_grids import dome
 from typed import known
 
 import scantruss as st
-from scantruss.attempts.table import attempts
+from scantruss.attempts.table import Attempt, attempts
 from scantruss.check.distances import offsets_from_points
+from scantruss.grid.certificate import Certificate, Fault, LeftOut
 from scantruss.kernels.geometry.boxes import new_boxes
 from scantruss.kernels.geometry.quadric import TERMS_OF_PLANE, TERMS_OF_QUADRIC
 from scantruss.kernels.surface.mean_surface import FIT_TURNS, KNOWN_TURNS, OFF_THE_FIT, mean_offsets, move_to_mean
@@ -132,3 +136,13 @@ def test_a_node_without_points_around_it_has_no_bias() -> None:
     nodes = np.array([[0.0, 0.0, 9.0], [1.0, 0.0, 9.0], [0.0, 1.0, 9.0]])
     grid = st.Grid(nodes, np.array([[0, 1, 2]]), np.zeros(3, bool), cloud.origin)
     assert np.isnan(offsets_from_points(grid, samples, 1.0)[0]).all()
+
+
+@pytest.mark.parametrize("smooth", [True, False])
+def test_advice_says_what_the_grid_that_it_names_leaves_out(smooth: bool) -> None:
+    part = LeftOut("far", 2100, 0.09, (1.0, 2.0, 3.5), 5.0, 9.0)
+    lacks = Certificate("", 1.0, True, True, 1, 1, 1, 1, 1, 0, (Fault("cover", "leaves out 9% of the scan"),))
+    grid = dome().replace(certificate=replace(lacks, missing=0.09, left_out=(part,)))
+    settings = st.Settings(length=1.0, **({"smooth_scale": 0.5} if smooth else {"plain_body": True}))
+    said = Attempt(settings).advice(st.CertificateError("fails", grid))
+    assert said.endswith("passes, but 9% of the scan is not in it, most of it near (1, 2, 3.5)")

@@ -9,7 +9,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from small_grids import dome
 
+import scantruss as st
 from scantruss.cli.main import main
 from scantruss.runtime.ours import kind_of_ours
 
@@ -199,3 +201,37 @@ def test_a_file_that_comes_while_we_compute_is_not_replaced(
     monkeypatch.setattr(pipeline, "grid_from_cloud", meanwhile)
     assert main(["grid", "a.xyz", "new.obj", "--length", LENGTH]) == 2
     assert (place / "new.obj").read_text() == "somebody else's\n" and "--force" in capsys.readouterr().err
+
+
+def test_in_python_too_no_file_of_others_is_written_over_unless_by_force(place: Path) -> None:
+    grid = dome(5, unit="m")
+    made = st.schedule(grid, st.ScheduleSettings(tube=60.0))
+    supported = st.set_out(st.Truss.from_grid(grid, supports="boundary"))
+    sizes: dict[str, Any] = {"member_diameter": 0.1, "node_diameter": 0.3}
+    Path("theirs.xlsx").write_bytes(b"theirs")
+    Path("theirs.pdf").write_bytes(b"%PDF theirs")
+    Path("rows_nodes.csv").write_text("theirs\n")
+    writers: list[Any] = [
+        lambda **more: st.write(grid, "theirs.obj", **more),
+        lambda **more: st.write(grid, "theirs.json", **more),
+        lambda **more: st.write(grid, "theirs.png", **more),
+        lambda **more: st.write(grid, "rows.csv", **more),
+        lambda **more: st.print_model(grid, "theirs.stl", **sizes, **more),
+        lambda **more: st.write_schedules(made, "theirs.xlsx", **more),
+        lambda **more: st.write_setting_out(supported, "theirs.pdf", **more),
+    ]
+    before = contents(place)
+    for write in writers:
+        with pytest.raises(st.FormatError, match="force=True"):
+            write()
+        assert contents(place) == before
+    for write in writers:
+        write(force=True)
+        write()  # what is ours is replaced without being asked for
+
+
+def test_convert_says_what_it_replaced(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for number, name in enumerate(("one.json", "two.json")):
+        st.write(dome(5 + number, unit="m"), name)
+    assert main(["convert", "one.json", "two.json", "new.dxf"]) == 0
+    assert "wrote there before: two.json\n" in capsys.readouterr().out

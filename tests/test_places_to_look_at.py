@@ -412,3 +412,25 @@ def test_a_refusal_names_the_setting_that_accepts_it_only_where_that_is_enough()
         with pytest.raises(CertificateError) as refused:
             passed_grid(grid.replace(certificate=found))
         assert str(refused.value).startswith(said)
+
+
+def test_points_that_are_listed_as_far_or_as_limbs_are_not_said_to_be_missed_again() -> None:
+    found = Certificate("mm", 1.0, True, True, 1, 1, 1, 1, 1, 0, points=10_000)
+    far = LeftOut("far", 1940, 0.194, (1.0, 2.0, 3.0), 5.0, 1720.0)
+    for missing, said in ((0.2, []), (0.23, ["misses 3.6% of the points by half a member to a member"])):
+        warnings = places_to_look_at(replace(found, missing=missing, left_out=(far,)), (0.0, 0.0, 0.0))
+        assert [warning.words for warning in warnings if warning.kind == "missed"] == said
+        assert warnings[0].words == "misses 1,940 points (19.40%) by up to 1,720 mm"
+    limbs = replace(far, kind="limbs")
+    (only,) = places_to_look_at(replace(found, missing=0.2, left_out=(limbs,)), (0.0, 0.0, 0.0))
+    assert only.kind == "left out"
+
+
+def test_the_verdict_says_how_much_was_left_out_as_asked_for() -> None:
+    crop = LeftOut("outside the box", 13_856, 0.2716, (1.0, 2.0, 3.0), 1460.0, asked=True)
+    found = Certificate("mm", 1.0, True, True, 1, 1, 1, 1, 1, 0, points=37_161, left_out=(crop,))
+    assert "27.16% of the scan left out as asked for" in str(found)
+    assert left_out_lines(found) == [
+        "left out: 13,856 points (27.16%) outside the box, near (1, 2, 3), 1,460 mm across, as asked for"
+    ]
+    assert "asked" not in str(replace(found, left_out=()))

@@ -19,6 +19,7 @@ from scantruss.scan.formats.systems import from_wkt
 from scantruss.scan.formats.writing import write_points
 from scantruss.scan.stream.fit import read_thinned
 from scantruss.scan.stream.thin_scan import thin_scan
+from scantruss.scan.units import check_unit
 from scantruss.selection import Selection
 from scantruss.settings import Settings
 
@@ -333,3 +334,20 @@ def test_coordinates_that_single_precision_has_rounded_are_told(tmp_path: Path) 
     np.save(tmp_path / "a.npy", (plan + [500_000.0, 4_500_000.0, 300.0]).astype(np.float32))
     (note,) = read_points(tmp_path / "a.npy", unit="m").notes
     assert note.startswith("x and y are in steps of up to 0.5 m, rounded to single precision")
+
+
+@pytest.mark.parametrize(("word", "unit"), [("ft", "foot"), ("FEET", "foot"), ("in", "inch"), ("metres", "m")])
+def test_other_names_of_units_are_understood_on_the_command_line(
+    word: str, unit: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    rng = np.random.default_rng(1)
+    np.savetxt(tmp_path / "a.xyz", np.column_stack([rng.uniform(0, 10, (3000, 2)), np.zeros(3000)]))
+    for words in (["--unit", word], [f"--unit={word}"]):
+        assert main(["clean", str(tmp_path / "a.xyz"), str(tmp_path / "out.ply"), *words, "--no-smooth"]) == 0
+    assert f"comment unit {unit}".encode() in (tmp_path / "out.ply").read_bytes()[:400]
+    assert main(["clean", str(tmp_path / "a.xyz"), str(tmp_path / "out.ply"), "--unit", "mile"]) == 2
+
+
+def test_a_unit_of_another_name_is_named_where_it_is_refused() -> None:
+    with pytest.raises(InputError, match=r"got 'ft' \(write foot\)"):
+        check_unit("ft")

@@ -76,9 +76,11 @@ def words_of_place(where: Iterable[float]) -> str:
 
 
 def words_of_number(value: float, digits: int) -> str:
-    """Return a number with so many digits for a reader: 1440, where a format alone would say 1.44e+03."""
+    """Return a number with so many digits for a reader: 1,440, where a format alone would say 1.44e+03."""
     short = f"{value:.{digits}g}"
-    return f"{float(short):.0f}" if "e+" in short and abs(value) < MOST_WRITTEN_OUT else short
+    if not 1000.0 <= abs(rounded := float(short)) < MOST_WRITTEN_OUT:
+        return short
+    return f"{rounded:,.0f}" if rounded.is_integer() else f"{rounded:,}"
 
 
 def decimal_comma_words(text: str) -> str:

@@ -11,6 +11,7 @@ from ..boundary.find import find_boundary
 from ..cells.make import settings_of_triangles
 from ..check.certify import MOST_ACCEPTED
 from ..constraints.find import ridges_away_from
+from ..errors import words_of_place
 from ..front.orientation_field import FieldStart
 from ..settings import SAMPLE_SPACING
 from ..surface.samples import sample_surface
@@ -19,6 +20,7 @@ from .looks import ROUGH_SCAN, VERY_ROUGH_SCAN, AskedScan
 
 if TYPE_CHECKING:
     from ..errors import FrontError, ScanTrussError
+    from ..grid.certificate import Certificate
     from ..scan.cloud import PointCloud
     from ..settings import Settings
 
@@ -75,10 +77,18 @@ class Attempt:
         allowing = f"--allow-missing {math.ceil(100.0 * found.missing) / 100.0:g}"
         if self.settings.smooth_scale and found.missing <= MOST_ACCEPTED:
             smooth = f"--smooth-scale {self.settings.smooth_scale:g} --ridge-angle 0"
-            return f"with {smooth} {allowing} a grid of its mean surface passes"
+            return f"with {smooth} {allowing} a grid of its mean surface passes, {_dropping(found)}"
         if self.settings.plain_body and found.missing <= FAR_MISSING * self.settings.allow_missing:
-            return f"with --plain-body {allowing} a grid without its thin limbs passes"
+            return f"with --plain-body {allowing} a grid without its thin limbs passes, {_dropping(found)}"
         return ""
+
+
+def _dropping(found: Certificate) -> str:
+    """Say how much of the scan a grid leaves out that only leaves out too much, and where most of that is."""
+    own = [part for part in found.left_out if part.points and part.where is not None and not part.asked]
+    most = max(own, key=lambda part: part.points, default=None)
+    at = "" if most is None or most.where is None else f", most of it near ({words_of_place(most.where)})"
+    return f"but {found.missing:.0%} of the scan is not in it{at}"
 
 
 @dataclass(frozen=True)

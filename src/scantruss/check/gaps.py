@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..errors import words_of_number
 from ..grid.certificate import Fault, LeftOut, place_of
 from ..kernels.geometry.boxes import SearchBoxes
 from ..kernels.geometry.components import component_labels
@@ -107,7 +108,7 @@ def bridged_gaps(
     wide = [(width, gap.where) for width, gap, reaches_boundary, _ in found if reaches_boundary]
     kind = "bridged" if any(reaches_boundary and too_wide for _, _, reaches_boundary, too_wide in found) else "gap"
     more = f" ({len(wide)} such places)" if len(wide) > 1 else ""
-    words = f"bridges a gap {wide[0][0]:.3g}{unit} wide{more}" if wide else ""
+    words = f"bridges a gap {words_of_number(wide[0][0], 3)}{unit} wide{more}" if wide else ""
     warnings = (
         [Fault(kind, words, wide[0][1], tuple(where for _, where in wide[1:PLACES_KEPT] if where))] if wide else []
     )
@@ -129,7 +130,7 @@ def openings_closed(
     wide.sort(key=lambda hole: -(hole.size or 0.0))
     places, count = [hole.where for hole in wide if hole.where], sum(hole.number for hole in wide)
     more = f" ({count} such places)" if count > 1 else ""
-    what = f"{wide[0].size:.3g}{unit and ' ' + unit} across"
+    what = f"{words_of_number(wide[0].size or 0.0, 3)}{unit and ' ' + unit} across"
     left = samples.scan[(samples.judged == ROD) | (samples.judged == LIMB)]
     of_rods = all(
         _has_points_within(left, np.array(hole.where) - samples.origin, hole.size) for hole in wide if hole.where

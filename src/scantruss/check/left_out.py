@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from .distances import Distances
 
 LIMBS_APART = 0.5  # gap between points of two limbs [member lengths]
+AROUND_HOLE = 0.25  # distance from a hole at which a place names it [member lengths]
 PLACES_LISTED = 5  # places of a kind that are listed one by one; the others are one entry without a place
 
 
@@ -168,6 +170,20 @@ def closed_holes(samples: SurfaceSamples, boundary: Boundary) -> list[LeftOut]:
     points = by_x(samples.measured_points) if boundary.bridged else samples.measured_points
     holes += [_hole(curve, samples, asked=False) for curve in boundary.bridged if is_empty_within(curve, points)]
     return first_and_more(sorted(holes, key=lambda hole: -(hole.size or 0.0)))
+
+
+def asked_for(holes: list[LeftOut], places: Sequence[Sequence[float]], length: float) -> list[LeftOut]:
+    """Return holes and gaps, those at one of some places as asked for: `fill_at` names them, by a point within or around one."""
+    return [
+        replace(hole, asked=True) if hole.where and any(_is_at(place, hole, length) for place in places) else hole
+        for hole in holes
+    ]
+
+
+def _is_at(place: Sequence[float], hole: LeftOut, length: float) -> bool:
+    """Whether a place lies in a hole or within a quarter of a member around it."""
+    away = float(np.linalg.norm(np.array(place, float) - np.array(hole.where)))
+    return away <= 0.5 * (hole.size or 0.0) + AROUND_HOLE * length
 
 
 def _closes_body(places: np.ndarray, samples: SurfaceSamples) -> bool:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import Place
+from ..errors import Place, words_of_number
 from ..grid.certificate import Certificate, Fault, place_of
 from ..grid.panels import inner_angles_of
 from ..settings import CheckSettings
@@ -30,6 +30,7 @@ PLACES_KEPT = 30  # places of a fault that are kept, the worst first
 ROUNDED_BY = 0.25  # distance from the grid above which a point is rounded off [member lengths]
 # share of the points that are rounded off above which it is a fault: 0.23 where nodes jump between two layers, 0.16 at most on others
 MOST_ROUNDED = 0.2
+SAID_ALONE = ("far", "limbs", "slits")  # kinds of what a grid misses that are listed with their own counts
 # share of the points that a grid may miss or round off, and ScanTruss may leave out by itself, without a word
 WARN_LEFT_OUT = 0.01
 
@@ -134,13 +135,17 @@ def places_to_look_at(found: Certificate, missed_at: Place, rounded: float = 0.0
     """
     unit = f" {found.unit}" if found.unit else ""
     warnings = [
-        Fault("far", f"misses {part.points:,} points ({part.share:.2%}) by up to {part.farthest:.3g}{unit}", part.where)
+        Fault(
+            "far",
+            f"misses {part.points:,} points ({part.share:.2%}) by up to {words_of_number(part.farthest, 3)}{unit}",
+            part.where,
+        )
         for part in found.left_out
         if part.kind == "far" and part.where is not None and part.farthest is not None
     ]
-    listed = sum(part.share for part in found.left_out if part.kind in ("limbs", "slits", "far"))
-    if found.missing - listed > WARN_LEFT_OUT:
-        words = f"misses {found.missing - listed:.1%} of the points by more than half a member"
+    farther = sum(part.share for part in found.left_out if part.kind in SAID_ALONE)
+    if (nearer := found.missing - farther) > WARN_LEFT_OUT:
+        words = f"misses {nearer:.1%} of the points by {'half a member to a member' if farther else 'more than half a member'}"
         warnings.append(Fault("missed", words, missed_at))
     if WARN_LEFT_OUT < rounded <= MOST_ROUNDED:
         words = (

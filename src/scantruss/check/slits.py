@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..errors import words_of_number
 from ..grid.certificate import Fault, LeftOut, place_of
 from ..kernels.mesh.coverage import nearest_distances
 from ..runtime.parallel import in_parts
@@ -244,6 +245,7 @@ def _warning(gaps: list[tuple[LeftOut, float]], unit: str) -> Fault:
     """Return the warning of some gaps with their widths, the longest first."""
     longest, width = gaps[0]
     more = f" ({len(gaps)} such places)" if len(gaps) > 1 else ""
-    words = f"bridges a gap {width:.3g}{unit} wide and {longest.size:.3g}{unit} long{more}"
+    long = words_of_number(longest.size or 0.0, 3)
+    words = f"bridges a gap {words_of_number(width, 3)}{unit} wide and {long}{unit} long{more}"
     also = tuple(gap.where for gap, _ in gaps[1:PLACES_KEPT] if gap.where)
     return Fault("gap", words, longest.where, also)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..errors import words_of_number
 from ..grid.certificate import Fault, place_of
 from .distances import heights_over
 from .left_out import points_together
@@ -63,9 +64,10 @@ def unfollowed_steps(
     unit = f" {grid.unit}" if grid.unit else ""
     worst = [int(own[step[own].argmax()]) for own in lines[:PLACES_KEPT]]
     several = f"{len(lines)} narrow parts of the scan, the largest" if len(lines) > 1 else "a narrow part of the scan"
+    long = words_of_number(sizes[lines[0][0]], 3)
     words = (
-        f"does not follow {several} {sizes[lines[0][0]]:.3g}{unit} long, such as a beam, a rib or a fin: the points there lie"
-        f" up to {step[worst].max():.3g}{unit} apart in height"
+        f"does not follow {several} {long}{unit} long, such as a beam, a rib or a fin: the points there lie"
+        f" up to {words_of_number(step[worst].max(), 3)}{unit} apart in height"
     )
     at, *others = (place_of(place) for place in places[worst] + samples.origin)
     return [Fault("unfollowed", words, at, tuple(others))]

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..errors import words_of_number
 from ..grid.certificate import Fault, place_of
 from .distances import heights_over
 from .folds import fold_angles
@@ -94,7 +95,7 @@ def mostly_unfollowed(
 def _points_off(samples: SurfaceSamples, found: Distances, which: np.ndarray, what: str, more: str = "") -> Fault:
     """Return the fault or warning of points (K,) that are not followed, with words before and after how far off they are."""
     unit, worst = f" {samples.unit}" if samples.unit else "", int(which[found.scan[which].argmax()])
-    words = f"{what} of its points lie up to {found.scan[worst]:.3g}{unit} off{more}"
+    words = f"{what} of its points lie up to {words_of_number(found.scan[worst], 3)}{unit} off{more}"
     return Fault("unfollowed", words, place_of(samples.scan[worst] + samples.origin))
 
 
@@ -133,7 +134,7 @@ def rounded_peaks(
     peaks.sort(key=lambda own: -float(found.scan[own].max()))
     worst = [int(own[found.scan[own].argmax()]) for own in peaks[:PLACES_KEPT]]
     unit, more = f" {grid.unit}" if grid.unit else "", f" ({len(peaks)} such places)" if len(peaks) > 1 else ""
-    words = f"cuts off a peak, a tip or a dip by {found.scan[worst[0]]:.3g}{unit}{more}; shorter members follow it"
+    words = f"cuts off a peak, a tip or a dip by {words_of_number(found.scan[worst[0]], 3)}{unit}{more}; shorter members follow it"
     at, *others = (place_of(place) for place in samples.scan[worst] + samples.origin)
     return [Fault("peak", words, at, tuple(others))]
 
@@ -201,8 +202,8 @@ def _warning(grid: Grid, samples: SurfaceSamples, found: Distances, parts: list[
         "as panels were made planar, or for a beam or a rib" if is_planar else "such as a beam, a rib or a second layer"
     )
     words = (
-        f"does not follow {several} {_size(parts[0], samples):.3g}{unit} long, {why}:"
-        f" {points:,} points ({points / len(samples.scan):.1%}) lie up to {found.scan[worst].max():.3g}{unit} off"
+        f"does not follow {several} {words_of_number(_size(parts[0], samples), 3)}{unit} long, {why}:"
+        f" {points:,} points ({points / len(samples.scan):.1%}) lie up to {words_of_number(found.scan[worst].max(), 3)}{unit} off"
     )
     at, *others = (place_of(place) for place in samples.scan[worst] + samples.origin)
     return Fault("unfollowed", words, at, tuple(others))

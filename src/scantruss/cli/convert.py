@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from .grids import add_grid, check_drawing_passed
 from .outputs import Taken, claim, outs_of
+from .styles import add_styles, style_of
 
 if TYPE_CHECKING:
     from ..export.model import Model
@@ -55,6 +56,7 @@ def convert_parser() -> Parser:
         "--system", metavar="EPSG:CODE", help="reference system, for .geojson and .ifc, of a scan that names none"
     )
     parser.add_argument("--keep-failed", action="store_true", help="also accept a grid that failed its certificate")
+    add_styles(parser)
     return parser
 
 
@@ -62,13 +64,13 @@ def convert(values: Namespace) -> None:
     """Write what a file holds in other formats."""
     from ..export.formats import GRID, STRUCTURE, check_output, read_model
     from ..export.model import with_system, with_unit
-    from ..export.style import FileStyle
     from ..grid.certificate import check_passed
     from ..report.terminal import Bars, print_lines
     from ..runtime.files import SaveTogether
 
     outs = [check_output(out, "") for out in outs_of(values)]
-    style = FileStyle(
+    style = style_of(
+        values,
         tube=values.tube,
         ball=values.ball,
         ifc=values.ifc,
@@ -78,6 +80,7 @@ def convert(values: Namespace) -> None:
     )
     taken = {Path(values.source).resolve(): "file that is read"}
     claim_models(outs, taken, force=values.force)
+    there = [str(out) for out in outs if out.is_file() and out.stat().st_size]
     with Bars() as bars, SaveTogether("" if values.force else "result") as save:
         bars("read", 0.0)
         check_drawing_passed(values.source, values.keep_failed)
@@ -97,7 +100,8 @@ def convert(values: Namespace) -> None:
         written = write_models(model, outs, save, bars, style)
     panels = "panels" if model.grid is None else model.grid.panels_are
     size = f"{len(model.local):,} nodes, {len(model.members):,} members, {len(model.panels):,} {panels}"
-    print_lines([size, f"wrote {' '.join(map(str, written))}"])
+    replaced = [f"in place of what ScanTruss wrote there before: {' '.join(there)}"] if there else []
+    print_lines([size, f"wrote {' '.join(map(str, written))}", *replaced])
 
 
 def claim_models(outs: list[Path], taken: Taken, *, force: bool, what: str = "result") -> None:

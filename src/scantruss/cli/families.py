@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import InputError
 from ..grid.alike import JOINTS, LENGTHS, PANELS
 from .outputs import claim, outs_of
+from .styles import add_styles, style_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -83,6 +84,7 @@ def families_parser() -> Parser:
     parser.add_argument(
         "--keep-failed", action="store_true", help="also accept and write a grid that fails its certificate"
     )
+    add_styles(parser)
     return parser
 
 
@@ -126,13 +128,13 @@ def families(values: Namespace) -> None:
             figures, words, picture = _of_lengths(before, found, values, off_scan)
         else:
             figures, words, picture = _of_kinds(before, found, values, off_scan)
-        wrote = write_models(model_of_grid(made), outs, save, bars)
+        wrote = write_models(model_of_grid(made), outs, save, bars, style_of(values))
         if report is not None:
             save.json(report, figures)
         if plot is not None:
             save.beside(plot).write_bytes(picture())
     wrote += [place for place in (report, plot) if place is not None]
-    print_lines([*words, *_after(values), f"wrote {' '.join(map(str, wrote))}"])
+    print_lines([*words, *_verdict(made, values), f"wrote {' '.join(map(str, wrote))}"])
 
 
 def _scan_of(grid: Grid, values: Namespace) -> ScanOfGrid:
@@ -227,6 +229,10 @@ def _words_of_kinds(figures: dict[str, Any], parts: str) -> list[str]:
     ]
 
 
-def _after(values: Namespace) -> list[str]:
-    """Return what is to be done then."""
-    return [] if values.scan else ["the grid has no certificate now; --scan SCAN checks it again"]
+def _verdict(made: Grid, values: Namespace) -> list[str]:
+    """Return what the certificate of the new grid says, or that it has none."""
+    from ..report.figures import warning_lines
+
+    if made.certificate is None or not values.scan:
+        return ["the grid has no certificate now; --scan SCAN checks it again"]
+    return [f"certificate: {made.certificate}", *warning_lines(made.certificate)]

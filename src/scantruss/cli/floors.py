@@ -27,7 +27,7 @@ def words_of_floor(bars: Bars, cloud: PointCloud, settings: Settings) -> str:
     from .shared import box_around
 
     length = settings.length
-    if not cloud.z_is_up or settings.length_field or settings.boundary:
+    if settings.length_field or settings.boundary:
         return ""
     try:
         mean = sample_surface(cloud, settings).surface.mean

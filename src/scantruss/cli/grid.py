@@ -10,8 +10,6 @@ from time import perf_counter
 from typing import TYPE_CHECKING
 
 from ..errors import CertificateError, FormatError, FrontError, LengthError, LinesError
-from ..export.drawing.style import VIEWS
-from ..export.style import OBJ_ELEMENTS, FileStyle
 from ..settings.values import ROTATION_NUMBERS
 from .outputs import claim, inputs_of, outs_of
 from .shared import (
@@ -26,8 +24,10 @@ from .shared import (
     settings_to_read,
     with_some_length,
 )
+from .styles import add_styles, style_of
 
 if TYPE_CHECKING:
+    from ..export.style import FileStyle
     from ..grid.grid import Grid
     from ..report.advice import Advice
     from ..report.terminal import Bars
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
 
 def grid_parser() -> Parser:
     """Options of ``scantruss grid``."""
-    from .options import Parser, add_outs, add_settings, picture_size
+    from .options import Parser, add_outs, add_settings
 
     parser = Parser(
         "grid",
@@ -64,29 +64,9 @@ def grid_parser() -> Parser:
         help="also write a grid that fails its certificate; the exit status is 3 either way",
     )
     add_memory(parser)
-    styles = parser.add_argument_group("pictures and tables")
-    styles.add_argument(
-        "--view",
-        dest="views",
-        metavar="NAME",
-        action="append",
-        help=f"side from which a picture is taken: {', '.join(VIEWS)} or AZIMUTH,ELEVATION in degrees; repeatable, side by side",
-    )
-    styles.add_argument("--size", metavar="WIDTHxHEIGHT", type=picture_size, help="size of a picture in pixels")
-    styles.add_argument(
-        "--obj", metavar="|".join(OBJ_ELEMENTS), default="faces", help="what .obj holds: triangles, members, or both"
-    )
-    styles.add_argument(
-        "--decimal-comma", action="store_true", help="write .csv with decimal commas and semicolons between columns"
-    )
+    add_styles(parser)
     add_settings(parser)
     return parser
-
-
-def style_of(values: Namespace) -> FileStyle:
-    """Return the styles of the files, as the options say."""
-    views = tuple(values.views or ("auto",))
-    return FileStyle(views=views, size=values.size, obj=values.obj, decimal_comma=values.decimal_comma)
 
 
 def grid(values: Namespace) -> None:
@@ -215,7 +195,7 @@ def grid_with_notes(
             bars.note(words)
     if settings.symmetry:
         bars.note(words_of_symmetry([row for row in made.symmetry if not isinstance(row, str)]))
-    note_outliers(bars, cloud, made)
+    note_outliers(bars, cloud, made, listed=grid.certificate)
     note_layers(bars, cloud, made)
     note_corners(bars, cloud, made)
     note_pieces(bars, cloud, made)

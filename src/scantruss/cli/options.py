@@ -22,6 +22,9 @@ from .positions import position, read_planes, read_polylines, read_positions
 WITH_UNIT = re.compile(r"[-+]?\d*[.,]?\d+\s*([a-z]+|\"|')", re.IGNORECASE)  # a number with its unit
 
 
+UNIT_OPTIONS = ("--unit", "--z-unit")
+
+
 class UsageError(InputError):
     """The command line cannot be understood."""
 
@@ -55,7 +58,7 @@ class Parser(argparse.ArgumentParser):
 
     def read(self, words: Sequence[str]) -> argparse.Namespace:
         """Return the values of the command line."""
-        words = _join_negative(words)
+        words = _with_usual_units(_join_negative(words))
         values, rest = self.parse_known_intermixed_args(words)
         self._check_once(words)
         if rest:
@@ -115,6 +118,20 @@ def _join_negative(words: Sequence[str]) -> list[str]:
         else:
             joined.append(word)
     return joined
+
+
+def _with_usual_units(words: Sequence[str]) -> list[str]:
+    """Name units as we do, such as foot for ft."""
+    from ..scan.units import usual_unit
+
+    named = list(words)
+    for number, word in enumerate(words):
+        option, equals, value = word.partition("=")
+        if option in UNIT_OPTIONS and equals:
+            named[number] = f"{option}={usual_unit(value)}"
+        elif option in UNIT_OPTIONS and number + 1 < len(words):
+            named[number + 1] = usual_unit(words[number + 1])
+    return named
 
 
 def number(text: str) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import re
 from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING
 from ..errors import InputError
 from .grids import add_grid, read_grid_or_structure
 from .outputs import claim, outs_of, wrote_line
+from .styles import add_decimal_comma
 
 if TYPE_CHECKING:
     from .options import Parser
@@ -90,6 +92,7 @@ def schedule_parser() -> Parser:
     parser.add_argument(
         "--slenderness", metavar="X", type=number, help="for a structure: warn of more slender members (default 200)"
     )
+    add_decimal_comma(parser)
     parser.add_argument("--keep-failed", action="store_true", help="also accept a grid that failed its certificate")
     return parser
 
@@ -100,7 +103,11 @@ def tube(text: str) -> tuple[float, float | None]:
     try:
         return float(diameter), float(wall) if times else None
     except ValueError:
-        raise argparse.ArgumentTypeError(f"needs a diameter and a wall in mm such as 114.3x5, got {text!r}") from None
+        point = re.sub(r"(?<=\d),(?=\d)", ".", text)
+        meant = f"; write {point} with a point" if point != text else ""
+        raise argparse.ArgumentTypeError(
+            f"needs a diameter and a wall in mm such as 114.3x5, got {text!r}{meant}"
+        ) from None
 
 
 def ball(text: str) -> float | None:
@@ -144,5 +151,5 @@ def make_schedule(values: Namespace) -> None:
         files: dict[Path, int] = {}
         for number, out in enumerate(outs):
             bars("write", number / len(outs))
-            files[out] = len(write_schedules(made, save.beside(out)))
+            files[out] = len(write_schedules(made, save.beside(out), decimal_comma=values.decimal_comma))
     print_lines([*schedule_lines(made, settings, what.alike), wrote_line(files)])

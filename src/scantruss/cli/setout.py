@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from ..errors import InputError
 from .grids import add_grid, read_grid_or_structure
 from .outputs import claim, outs_of, wrote_line
+from .styles import add_decimal_comma
 
 if TYPE_CHECKING:
     from ..setout.make import SettingOut
@@ -57,6 +58,7 @@ def setout_parser() -> Parser:
         default=SUPPRESS,
         help="section of the building frame, such as x=2500; repeatable (default: the middle of x and of y)",
     )
+    add_decimal_comma(parser)
     parser.add_argument("--keep-failed", action="store_true", help="also accept a grid that failed its certificate")
     return parser
 
@@ -101,7 +103,7 @@ def make_setting_out(values: Namespace) -> None:
         files: dict[Path, int] = {}
         for number, out in enumerate(outs):
             bars("write", number / len(outs))
-            files[out] = len(write_setting_out(made, save.beside(out)))
+            files[out] = len(write_setting_out(made, save.beside(out), decimal_comma=values.decimal_comma))
     print_lines([*setout_lines(made), wrote_line(files)])
 
 

@@ -14,10 +14,12 @@ from ..errors import unit_words, words_of_number
 if TYPE_CHECKING:
     import numpy as np
 
+    from ..grid.certificate import Certificate
     from ..report.terminal import Bars
     from ..scan.cloud import PointCloud
     from ..scan.stream.thin_scan import Thinned
     from ..settings import Settings
+    from ..surface.samples import SurfaceSamples
     from .options import Parser
 
 MOST_PIECES = 5  # pieces that are named one by one
@@ -112,8 +114,13 @@ def read_thinned_scan(path: str, settings: Settings, bars: Bars) -> PointCloud:
     return cloud
 
 
-def note_outliers(bars: Bars, cloud: PointCloud, settings: Settings, command: str = "") -> None:
-    """Report points that were left out of the scan, and the option that keeps them; `command` is named if it is of another command."""
+def note_outliers(
+    bars: Bars, cloud: PointCloud, settings: Settings, command: str = "", listed: Certificate | None = None
+) -> None:
+    """Report points that were left out of the scan, and the option that keeps them; `command` is named if it is of another command.
+
+    listed : certificate that lists the pieces that were left out, if there is one: they may hang on a limb
+    """
     from ..surface.samples import sample_surface
 
     samples = sample_surface(cloud, settings)
@@ -123,7 +130,7 @@ def note_outliers(bars: Bars, cloud: PointCloud, settings: Settings, command: st
     if samples.outliers:
         bars.note(f"{samples.outliers:,} outliers are left out; {say}--outlier-distance 0 keeps them")
     pieces, share = samples.left_out
-    if pieces:
+    if pieces and listed is None:
         bars.note(
             f"{pieces:,} {'piece' if pieces == 1 else 'pieces'}, {100 * share:.2g} % of the scanned surface, left out:"
             " too small for this length or compared with the others"
@@ -169,6 +176,13 @@ def box_around(low: np.ndarray, high: np.ndarray, margin: float) -> str:
     return ",".join(f"{c:.{decimals}f}" for c in (*low - margin, *high + margin))
 
 
+def _has_floor(samples: SurfaceSamples, length: float) -> bool:
+    """Whether one of the pieces would be taken for a floor if z were known to be up."""
+    from ..surface.floor import find_floor
+
+    return find_floor(samples.surface.mean, samples.piece, tuple(samples.pieces), length) is not None
+
+
 def note_pieces(bars: Bars, cloud: PointCloud, settings: Settings) -> None:
     """List the pieces of a scan with their sizes, and how to take one alone; nothing if there is only one.
 
@@ -183,6 +197,10 @@ def note_pieces(bars: Bars, cloud: PointCloud, settings: Settings) -> None:
         return
     if samples.floor is not None:
         bars.note("a level, flat piece under the others is taken for the floor and left out; --piece all keeps it")
+    elif not cloud.z_is_up and settings.piece == "auto" and _has_floor(samples, settings.length):
+        bars.note(
+            "a level, flat piece lies under the others, as a floor does; where the unit is m or foot it is left out, as z is up then"
+        )
     unit = f" {cloud.unit}" if cloud.unit else ""
     large = sorted({*samples.pieces, *samples.not_chosen})
     all_places = samples.surface.mean + cloud.origin

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from ..errors import InputError
 from .grids import add_grid, read_saved_grid
 from .outputs import Taken, claim, outs_of
+from .styles import add_decimal_comma
 
 if TYPE_CHECKING:
     import numpy as np
@@ -82,6 +83,7 @@ def structure_parser() -> Parser:
     for name, metavar, about in OWN_OPTIONS:
         kind = {"NUMBER": number, "COUNT": whole_number, "SCALE": scale, "SHARE": share}.get(metavar, str)
         parser.add_argument("--" + name.replace("_", "-"), metavar=metavar, type=kind, default=SUPPRESS, help=about)
+    add_decimal_comma(parser)
     parser.add_argument("--path-plot", metavar="FILE.png", help="picture of the path: load factor against displacement")
     parser.add_argument(
         "--dry-run", action="store_true", help="print the size and time of the path without computing it"
@@ -93,6 +95,7 @@ def structure_parser() -> Parser:
 def structure(values: Namespace) -> None:
     """Make the structure of a saved grid, solve it and save it."""
     from ..export.formats import STRUCTURE, check_output, model_of
+    from ..export.style import FileStyle
     from ..report.terminal import Bars, print_lines
     from ..runtime.files import SaveTogether
     from ..runtime.places import check_place
@@ -113,6 +116,7 @@ def structure(values: Namespace) -> None:
     if plot is not None:
         claim(plot, "picture", taken, force=values.force)
     from ..grid.certificate import check_passed
+    from ..structure.doubts import certificate_words
     from ..structure.path_report import encode_path, path_expectation
     from ..structure.truss import Truss
 
@@ -126,20 +130,23 @@ def structure(values: Namespace) -> None:
             return
         weighed = report_place is not None or any(out.suffix.lower() in (".html", ".pdf") for out in outs)
         solution, report = _solved(truss, grid, settings, weighed, bars)
+        of_grid = certificate_words(grid)
         bars("report", 0.0)
         models = [out for out in outs if out.suffix.lower() not in REPORT_SUFFIXES]
-        written = write_models(model_of(solution, report=report), models, save, bars)
+        written = write_models(
+            model_of(solution, report=report), models, save, bars, FileStyle(decimal_comma=values.decimal_comma)
+        )
         for out in outs:
             if out not in models:
-                save.beside(out).write_bytes(_encoded(out, values, settings, solution, report))
+                save.beside(out).write_bytes(_encoded(out, values, settings, solution, report, of_grid))
                 written.append(out)
         if report_place is not None and report_place.suffix.lower() == ".html":
-            save.beside(report_place).write_bytes(_encoded(report_place, values, settings, solution, report))
+            save.beside(report_place).write_bytes(_encoded(report_place, values, settings, solution, report, of_grid))
         elif report_place is not None:
-            save.json(report_place, report.to_dict())
+            save.json(report_place, report.to_dict() | {"warnings_of_grid": of_grid})
         if plot is not None and report.path is not None:
             save.beside(plot).write_bytes(encode_path(report.path))
-    _print_report(report, [*written, *(place for place in (report_place, plot) if place)])
+    _print_report(report, of_grid, [*written, *(place for place in (report_place, plot) if place)])
 
 
 def _solved(
@@ -173,7 +180,7 @@ def _solved(
     return solution, report_structure(solution, settings.checks, doubts_of_settings(settings, grid), **found)
 
 
-def _print_report(report: StructureReport, wrote: Sequence[Path]) -> None:
+def _print_report(report: StructureReport, of_grid: Sequence[str], wrote: Sequence[Path]) -> None:
     """Print the table of a structure, its lines, its warnings and the files that were written."""
     from ..report.terminal import print_lines, print_table
     from ..structure.doubts import support_words
@@ -209,13 +216,27 @@ def _print_report(report: StructureReport, wrote: Sequence[Path]) -> None:
                 else ["the stability of the whole is not looked at; --buckling 1 does"]
             ),
             *(f"warning: {words}" for words in report.warnings),
+            *_line_of_grid(of_grid, listed=any(place.suffix.lower() in (".html", ".pdf") for place in wrote)),
             f"wrote {' '.join(map(str, wrote))}",
         ]
     )
 
 
+def _line_of_grid(of_grid: Sequence[str], *, listed: bool) -> list[str]:
+    """Return one line on the faults and warnings of the certificate of the grid; listed: whether a report was written, with all."""
+    if len(of_grid) < 2:
+        return [f"warning: {words}" for words in of_grid]
+    first, where = of_grid[0].partition(" (near ")[0], "the report" if listed else "a report (.html, .pdf)"
+    return [f"warning: the certificate of the grid has {len(of_grid)} warnings, all in {where}: {first}, ..."]
+
+
 def _encoded(
-    out: Path, values: Namespace, settings: StructureSettings, solution: Solution, report: StructureReport
+    out: Path,
+    values: Namespace,
+    settings: StructureSettings,
+    solution: Solution,
+    report: StructureReport,
+    of_grid: Sequence[str],
 ) -> bytes:
     """Return what a report or a picture of the structure holds."""
     from ..report.structural.contents import overview_picture, report_parts
@@ -231,7 +252,8 @@ def _encoded(
     from ..report.structural.html import encode_html
     from ..report.structural.pdf import encode_pdf
 
-    parts = report_parts(ReportSource(Path(values.grid).name, _command_line(values), settings, solution, report))
+    source = ReportSource(Path(values.grid).name, _command_line(values), settings, solution, report, of_grid)
+    parts = report_parts(source)
     if out.suffix.lower() == ".pdf":
         return encode_pdf(parts)
     return encode_html(parts, encode_page(model_of(solution, report=report), FileStyle()))
@@ -243,7 +265,7 @@ def _command_line(values: Namespace) -> str:
     for name in ("settings", "report", "path_plot", *(name for name, _, _ in OWN_OPTIONS)):
         if vars(values).get(name) is not None:
             words += [f"--{name.replace('_', '-')}", f"{vars(values)[name]}"]
-    return shlex.join([*words, *["--keep-failed"] * values.keep_failed])
+    return shlex.join([*words, *["--decimal-comma"] * values.decimal_comma, *["--keep-failed"] * values.keep_failed])
 
 
 def _path(truss: Truss, settings: StructureSettings, progress: Progress) -> StructurePath:

@@ -11,7 +11,7 @@ from ..boundary.polylines import POINTS_UNDER_LINE, corners_of_polyline, divide_
 from ..errors import InputError, unit_words, words_of_number
 from ..kernels.surface.local_surface import Surface
 from ..surface.samples import SurfaceSamples, distance_from_scan, narrow_surface
-from .fixed_nodes import place_text
+from .fixed_nodes import nearest_words, place_text
 
 if TYPE_CHECKING:
     from ..settings import Settings
@@ -58,7 +58,8 @@ def _check_on_scan(
         if distance > 0.5 * length:
             raise InputError(
                 f"fixed line {number}, point {k + 1} {place_text(line[k])} is {words_of_number(distance, 4)}{unit} away from the scan;"
-                f" it must lie within half a member, {0.5 * length:.4g}{unit}"
+                f" it must lie within half a member, {0.5 * length:.4g}{unit};"
+                f" {nearest_words(np.array(line, float), place, samples, length)}"
             )
 
 

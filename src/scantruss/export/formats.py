@@ -17,6 +17,7 @@ from ..grid.grid import Grid
 from ..grid.upward import picture_notes
 from ..runtime.files import write_files
 from ..runtime.memory import nothing_collected
+from ..runtime.ours import FORCE_ARGUMENT, check_ours
 from ..runtime.places import check_place, nearest_suffix, suffix_of
 from ..scan.cloud import PointCloud
 from ..scan.formats.extras import need_library
@@ -234,6 +235,7 @@ def write(
     cloud: PointCloud | None = None,
     style: FileStyle | None = None,
     report: StructureReport | None = None,
+    force: bool = False,
 ) -> list[Path]:
     """Write a grid or a structure; the suffix of the path names the format.
 
@@ -249,6 +251,8 @@ def write(
         Choices that formats leave open: views and size of a picture, faces or lines in OBJ, decimal comma in CSV, bodies in IFC.
     report : StructureReport, optional
         Of a Solution: the utilization of its members.
+    force : bool
+        Whether to write over a file that ScanTruss did not write, as its content tells.
 
     Returns
     -------
@@ -258,17 +262,20 @@ def write(
     Raises
     ------
     FormatError
-        Unknown suffix, an extra that is not installed, no such folder, no space; nothing half-written is left.
+        Unknown suffix, an extra that is not installed, no such folder, no space, or a file of somebody else there; nothing
+        half-written is left.
     """
     if not isinstance(path, str | Path):
         raise FormatError(f"write needs a grid or structure, then a file name, got {type(path).__name__} as the file")
     model = model_of(what, cloud=cloud, report=report)
     path = check_output(path, GRID if model.truss is None else STRUCTURE)
     check_model_unit(path, model.unit)
+    if not force:
+        check_ours(path, "result", FORCE_ARGUMENT)
     encode = FORMATS[suffix_of(path, suffixes_of())].encode
     assert encode is not None  # `check_output` knows only formats that are written
     with nothing_collected():
-        return write_files(encode(model, path, style or FileStyle()))
+        return write_files(encode(model, path, style or FileStyle()), force=force)
 
 
 def read_model(path: str | Path, merge: float | None = None) -> Model:

@@ -35,6 +35,7 @@ def print_model(
     sides: int = 12,
     marks: bool = False,
     keep_failed: bool = False,
+    force: bool = False,
 ) -> Solid:
     """Write the grid as one watertight solid for a 3D printer.
 
@@ -54,6 +55,8 @@ def print_model(
         Engrave the mark of each node on its ball.
     keep_failed : bool
         Print a grid even if it failed its certificate.
+    force : bool
+        Whether to write over files that ScanTruss did not write.
 
     Returns
     -------
@@ -75,7 +78,7 @@ def print_model(
         grid, member_diameter=member_diameter, node_diameter=node_diameter, scale=scale, sides=sides, marks=marks
     )
     encode = encode_3mf if path.suffix.lower() == ".3mf" else encode_stl
-    write_files({path: encode(solid)})
+    write_files({path: encode(solid)}, force=force)
     return solid
 
 

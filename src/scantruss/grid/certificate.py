@@ -143,6 +143,11 @@ class Certificate:
         own = (part for part in self.left_out if not part.asked and part.kind != "duplicates")
         return sum(part.share for part in own)
 
+    @property
+    def asked_out(self) -> float:
+        """Share of the points of the file that settings left out, as by a crop, a class or a piece."""
+        return sum(part.share for part in self.left_out if part.asked)
+
     def worst_places(self) -> list[tuple[str, Worst, bool]]:
         """Return the worst figures that are known: name, figure with its place, whether it is an angle [degree] or a length."""
         found = (
@@ -200,6 +205,7 @@ class Certificate:
             "no triangles cut each other",
             f"{self.scan_within_reach:.2%} of the scan and {self.grid_within_reach:.2%} of the triangles within"
             f" {words_of_number(self.reach, 3)} {self.unit}".rstrip(),
+            f"{self.asked_out:.2%} of the scan left out as asked for" if self.asked_out > 0.0 else "",
             f"irregular {self.irregular}, forced {self.irregular_forced}",
         ]
         return ", ".join(word for word in parts if word)

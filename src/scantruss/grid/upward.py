@@ -23,8 +23,12 @@ POLYGON_DIRECTIONS = 64  # directions in which a convex polygon is sought
 
 
 def known_upward(grid: Grid, cloud: PointCloud | None) -> np.ndarray | None:
-    """Return the direction against gravity (3,) if unit or file give it: scans of buildings and terrain have z up."""
-    known = grid.unit in SURVEY_UNITS or (cloud is not None and cloud.z_is_up)
+    """Return the direction against gravity (3,) if unit or file give it: scans of buildings and terrain have z up.
+
+    So have those with a level floor under the grid, which is looked for along z alone.
+    """
+    on_floor = grid.certificate is not None and any(part.kind == "floor" for part in grid.certificate.left_out)
+    known = grid.unit in SURVEY_UNITS or (cloud is not None and cloud.z_is_up) or on_floor
     return AGAINST_GRAVITY if known else None
 
 
@@ -41,7 +45,9 @@ def guessed_up(grid: Grid, cloud: PointCloud | None = None) -> str:
 def picture_notes(grid: Grid, cloud: PointCloud | None = None) -> list[str]:
     """Return a note where a picture of a grid shows another axis up than files and structures have."""
     up = guessed_up(grid, cloud)
-    return [f"the picture shows {up} up, as the shape tells; in files and structures z is up"] if up else []
+    return (
+        [f"the picture shows {up} up, which is guessed from the shape; in files and structures z is up"] if up else []
+    )
 
 
 def facing_of(nodes: np.ndarray, triangles: np.ndarray) -> np.ndarray:
@@ -55,7 +61,8 @@ def facing_of(nodes: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 def likely_upward(nodes: np.ndarray, facing: np.ndarray) -> np.ndarray:
     """Return the direction that is probably up (3,), where gravity is not known: an object lies on its largest flat face.
 
-    An open shell stands on its opening. An object without a flat face stands along its longest side, or lies if it is flat.
+    An open shell lies across the way it faces, with y or z of its file upwards: a net between masts and a bowl face down. An object
+    without a flat face stands along its longest side, or lies if it is flat.
     """
     openness = float(np.linalg.norm(facing))
     if openness > OPEN_SHELL:
@@ -88,8 +95,9 @@ def _area_around(flat: np.ndarray) -> float:
 
 
 def _upward(facing: np.ndarray) -> np.ndarray:
-    """Return the direction itself, or the axis it is nearly along."""
+    """Return the direction itself, or the axis it is nearly along; the other way round if it is along -y or -z, which no file has up."""
     axis = int(np.argmax(np.abs(facing)))
+    facing = -facing if axis in (1, 2) and facing[axis] < 0.0 else facing
     return np.eye(3)[axis] * np.sign(facing[axis]) if abs(facing[axis]) > math.cos(math.radians(25)) else facing
 
 

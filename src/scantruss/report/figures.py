@@ -105,10 +105,10 @@ def grid_lines(grid: Grid, points: int) -> list[str]:
     topology = grid.topology
     loops = topology.boundary_loops
     lines = [
-        f"{len(grid.nodes)} nodes, {len(grid.edges)} members, {len(grid.panel_table)} {grid.panels_are} from {points} points",
+        f"{len(grid.nodes)} nodes, {len(grid.edges)} members, {len(grid.panel_table)} {grid.panels_are} from {points:,} points",
         f"{topology.components} {'piece' if topology.components == 1 else 'pieces'}, "
         + (
-            f"{loops} boundary {'loop' if loops == 1 else 'loops'}, {count_holes(grid)} of them holes"
+            f"{loops} boundary {'loop' if loops == 1 else 'loops'}, {_holes_in_words(count_holes(grid))}"
             if loops
             else "closed"
         ),
@@ -125,6 +125,11 @@ def grid_lines(grid: Grid, points: int) -> list[str]:
     if grid.seconds:
         lines.append("seconds: " + ", ".join(f"{stage} {seconds:.2f}" for stage, seconds in grid.seconds.items()))
     return lines
+
+
+def _holes_in_words(count: int) -> str:
+    """Return how many boundary loops are holes."""
+    return "no hole" if count == 0 else f"{count} of them {'a hole' if count == 1 else 'holes'}"
 
 
 def line_lines(grid: Grid) -> list[str]:
@@ -203,7 +208,8 @@ def left_out_lines(certificate: Certificate) -> list[str]:
         place = "" if part.where is None else f", near ({words_of_place(part.where)}), {size}"
         place = f", up to {words_of_number(part.size or 0.0, 3)}{unit} across" if part.number > 1 else place
         count = f"{part.points:,} points ({part.share:.2%}) " if part.points else ""
-        lines.append(f"left out: {count}{part.words}{place}" if count else f"{part.words}{place}")
+        asked = ", as asked for" if part.asked else ""
+        lines.append(f"left out: {count}{part.words}{place}{asked}" if count else f"{part.words}{place}")
     return lines
 
 

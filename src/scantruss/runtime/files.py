@@ -17,7 +17,7 @@ from types import TracebackType
 from typing import Any
 
 from ..errors import FormatError
-from .ours import MADE_BY, check_ours
+from .ours import FORCE_ARGUMENT, MADE_BY, check_ours
 from .stopping import is_clean, left_behind, put_into_place, signals_held
 
 
@@ -142,13 +142,17 @@ def temporary_folder() -> Iterator[Path]:
             is_clean(remove)
 
 
-def write_files(contents: Mapping[Path, bytes]) -> list[Path]:
+def write_files(contents: Mapping[Path, bytes], *, force: bool = False, kind: str = "result") -> list[Path]:
     """Write files that belong together, all or none.
 
     Parameters
     ----------
     contents : mapping of Path to bytes
         Content of each file.
+    force : bool
+        Whether to write over a file that ScanTruss did not write, or that is of another kind.
+    kind : str
+        "result" or "cloud".
 
     Returns
     -------
@@ -158,9 +162,12 @@ def write_files(contents: Mapping[Path, bytes]) -> list[Path]:
     Raises
     ------
     FormatError
-        A file could not be written (full disk, no permission); no half-written file is left.
+        A file could not be written (full disk, no permission), no half-written file is left; or one is there that is not ours.
     """
     path = Path()
+    if not force:
+        for path in contents:
+            check_ours(path, kind, FORCE_ARGUMENT)
     try:
         with SaveTogether() as save:
             for path, content in contents.items():

@@ -12,6 +12,8 @@ from ..errors import FormatError
 MADE_BY = f"ScanTruss {__version__}"  #: stands near the beginning of every file that can hold it
 CLOUD_MARK = f"point cloud by {MADE_BY}"  #: the same of a cloud, which no other result may replace
 BYTES_WITH_MARK = 8192  # bytes from the beginning in which the mark stands
+FORCE_OPTION = "add --force to replace it (what is read comes first, and a pattern such as *.ply needs quotes)"  # on a command line
+FORCE_ARGUMENT = "give force=True to replace it"  # in Python
 LARGEST_PDF = 50_000_000  # bytes of a PDF file in which the mark is sought
 # tables have no place for a mark: those of members, of nodes, of a sweep, of schedules, of setting out
 TABLE_HEADS = re.compile(
@@ -46,19 +48,24 @@ def kind_of_ours(path: Path) -> str:
     text = head.replace(b"\x00", b"")  # numpy keeps text in four bytes a letter
     if b"point cloud by ScanTruss" in text or (text.startswith(b"LASF") and b"ScanTruss" in text):
         return "cloud"
-    return "result" if re.search(rb"ScanTruss \d|scantruss-grid", text) or TABLE_HEADS.match(text) else ""
+    return (
+        "result"
+        if re.search(rb"ScanTruss \d|scantruss-grid", text) or TABLE_HEADS.match(text.replace(b";", b","))
+        else ""
+    )
 
 
-def check_ours(path: Path, kind: str) -> None:
-    """Refuse to write over a file of somebody else, or over a cloud where the result is none.
+def check_ours(path: Path, kind: str, replace: str = FORCE_OPTION) -> None:
+    """Refuse to write over a file of somebody else that is not empty, or over a cloud where the result is none.
+
+    `replace` says how it is replaced all the same.
 
     Raises
     ------
     FormatError
         There is a file that ScanTruss did not write, or one of another kind.
     """
-    if path.is_file() and kind_of_ours(path) != kind:
+    if path.is_file() and path.stat().st_size and kind_of_ours(path) != kind:
         raise FormatError(
-            f"{path} exists already and is not a {kind} that ScanTruss wrote; name a new file, or add --force to replace it"
-            " (what is read comes first, and a pattern such as *.ply needs quotes)"
+            f"{path} exists already and is not a {kind} that ScanTruss wrote; name a new file, or {replace}"
         )

@@ -22,7 +22,14 @@ _WORDS = {"feet": "foot", "ft": "foot", "in": "inch", "inches": "inch"}
 def check_unit(unit: str) -> None:
     """Refuse an unknown unit."""
     if unit not in UNITS:
-        raise InputError(f"unit must be one of {' '.join(u for u in UNITS if u)}, got {unit!r}")
+        meant = f" (write {usual_unit(unit)})" if usual_unit(unit) in UNITS else ""
+        raise InputError(f"unit must be one of {' '.join(u for u in UNITS if u)}, got {unit!r}{meant}")
+
+
+def usual_unit(word: str) -> str:
+    """Return our name of a unit that has several, such as foot for ft, feet or FEET; any other word as it is."""
+    known = re.fullmatch(f"{_NAMES}|in", word, re.IGNORECASE)
+    return name_of(metres_of(word)) or word if known else word
 
 
 def metres_of(word: str) -> float | None:

@@ -36,7 +36,9 @@ def schedule_paths(path: Path) -> dict[str, Path]:
     return {name: path if name == MAIN_TABLE else path.with_name(f"{path.stem}_{name}{path.suffix}") for name in names}
 
 
-def write_schedules(schedules: Schedules, path: str | Path) -> list[Path]:
+def write_schedules(
+    schedules: Schedules, path: str | Path, *, decimal_comma: bool = False, force: bool = False
+) -> list[Path]:
     """Write schedules: all tables in one workbook, or in one CSV file each; the same schedules give the same bytes.
 
     Parameters
@@ -45,6 +47,10 @@ def write_schedules(schedules: Schedules, path: str | Path) -> list[Path]:
         What to write.
     path : str or Path
         File ending in .xlsx, or in .csv: the table of members, the others beside it.
+    decimal_comma : bool
+        Whether a .csv has decimal commas, and semicolons between the columns.
+    force : bool
+        Whether to write over files that ScanTruss did not write.
 
     Returns
     -------
@@ -62,10 +68,13 @@ def write_schedules(schedules: Schedules, path: str | Path) -> list[Path]:
             raise FormatError(
                 f"cannot write {path}: a sheet holds {MOST_ROWS:,} rows and {rows:,} are needed; write .csv"
             )
-        return write_files({path: encode_xlsx(schedules)})
+        return write_files({path: encode_xlsx(schedules)}, force=force)
     places = schedule_paths(path)
     tables: dict[Path, Schedule] = {places[name]: table for name, table in schedules.named.items()}
-    return write_files({place: encode_table(table.heads, table.rows) for place, table in tables.items()})
+    return write_files(
+        {place: encode_table(table.heads, table.rows, decimal_comma=decimal_comma) for place, table in tables.items()},
+        force=force,
+    )
 
 
 def encode_xlsx(schedules: Workbook) -> bytes:

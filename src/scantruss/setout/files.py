@@ -61,7 +61,9 @@ def _ezdxf() -> Any:
         raise FormatError(NEEDS_EZDXF) from None
 
 
-def write_setting_out(made: SettingOut, path: str | Path) -> list[Path]:
+def write_setting_out(
+    made: SettingOut, path: str | Path, *, decimal_comma: bool = False, force: bool = False
+) -> list[Path]:
     """Write a setting out; the same one gives the same bytes.
 
     Parameters
@@ -69,6 +71,10 @@ def write_setting_out(made: SettingOut, path: str | Path) -> list[Path]:
     made : SettingOut
     path : str or Path
         File ending in .csv (supports, other tables beside it), .xlsx, .dxf or .pdf.
+    decimal_comma : bool
+        Whether a .csv has decimal commas, and semicolons between the columns.
+    force : bool
+        Whether to write over files that ScanTruss did not write.
 
     Raises
     ------
@@ -78,12 +84,16 @@ def write_setting_out(made: SettingOut, path: str | Path) -> list[Path]:
     path = check_setout_place(path)
     if (suffix := path.suffix.lower()) == ".csv":
         pairs = zip(setout_paths(path), made.tables, strict=True)
-        return write_files({place: encode_table(table.heads, table.rows) for place, table in pairs})
+        return write_files(
+            {place: encode_table(table.heads, table.rows, decimal_comma=decimal_comma) for place, table in pairs},
+            force=force,
+        )
     if suffix == ".xlsx":
-        return write_files({path: encode_xlsx(made)})
+        return write_files({path: encode_xlsx(made)}, force=force)
     sheets = make_sheets(made)
     return write_files(
-        {path: encode_plan_dxf(sheets) if suffix == ".dxf" else encode_plan_pdf(sheets, made.settings.paper)}
+        {path: encode_plan_dxf(sheets) if suffix == ".dxf" else encode_plan_pdf(sheets, made.settings.paper)},
+        force=force,
     )
 
 

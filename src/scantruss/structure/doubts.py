@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..grid.certificate import near
 from ..grid.grid import Grid
 from ..grid.upward import OPEN_SHELL, facing_of, guessed_up
 from .options import StructureSettings, units_taken
@@ -31,7 +32,7 @@ def support_words(truss: Truss) -> str:
 
 def doubts_of(truss: Truss) -> list[str]:
     """Return warnings of a structure on its side, of supports that hold most of it, and of combinations that leave out something."""
-    warnings = _sideways(truss)
+    warnings = [*_sideways(truss), *_weightless(truss)]
     held, used = _held(truss), np.unique(truss.members)
     if len(held) > MANY_HELD * len(used):
         warnings.append(
@@ -48,6 +49,15 @@ def doubts_of(truss: Truss) -> list[str]:
             f"the combinations that were given have none of {missing}; those of EN 1990 are not added to them"
         )
     return warnings
+
+
+def certificate_words(grid: Grid) -> list[str]:
+    """Return the faults and warnings of the certificate of a grid, of which a structure is made all the same."""
+    found = grid.certificate
+    if found is None:
+        return []
+    faults = [f"the grid FAILED its certificate: it {fault.words}{near(fault.where)}" for fault in found.faults]
+    return [*faults, *(f"the grid {warning.words}{near(warning.where)}" for warning in found.warnings)]
 
 
 def doubts_of_settings(settings: StructureSettings, grid: Grid) -> list[str]:
@@ -84,6 +94,13 @@ def _sideways(truss: Truss) -> list[str]:
     return [
         f"the surface faces {name} and weight acts along z; where {name} is up in the file, turn the scan first, so that z is"
     ]
+
+
+def _weightless(truss: Truss) -> list[str]:
+    """Return a warning where loads are given and none is the weight of the members."""
+    if not truss.cases or any(case.self_weight for case in truss.cases):
+        return []
+    return ["the weight of the members is not among the loads; self adds it, as in --loads self,snow:1kN/m2"]
 
 
 def _held(truss: Truss) -> np.ndarray:

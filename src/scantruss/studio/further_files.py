@@ -73,11 +73,15 @@ def _structure_report(state: StudioState, suffix: str) -> dict[str, bytes]:
     from ..report.structural.html import encode_html
     from ..report.structural.pdf import encode_pdf
     from ..report.structural.source import ReportSource
+    from ..structure.doubts import certificate_words
 
     model = model_to_show(state, STRUCTURE)
     assert state.solution is not None and state.report is not None
     command = command_of_project(state).splitlines()[-1]
-    parts = report_parts(ReportSource("grid.json", command, state.shown_structure, state.solution, state.report))
+    of_grid = certificate_words(state.grid) if state.grid is not None else []
+    parts = report_parts(
+        ReportSource("grid.json", command, state.shown_structure, state.solution, state.report, of_grid)
+    )
     if suffix == ".pdf":
         return {"structure-report.pdf": encode_pdf(parts)}
     return {"structure-report.html": encode_html(parts, encode_page(model, FileStyle()))}

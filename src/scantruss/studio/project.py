@@ -85,7 +85,7 @@ def save_project(path: Path, state: StudioState) -> None:
         if trade.before is not state.grid:
             parts[TRADE_BEFORE] = _kept(_GRIDS, trade.before, encode_json)
     parts |= {f"design-{k}.json": _kept(_GRIDS, each.grid, encode_json) for k, each in enumerate(state.designs, 1)}
-    write_files({path: _zipped(parts, zipfile.ZIP_DEFLATED, stored=("scan.npz", TRADE_NODES))})
+    write_files({path: _zipped(parts, zipfile.ZIP_DEFLATED, stored=("scan.npz", TRADE_NODES))}, force=True)
 
 
 _SCANS: weakref.WeakKeyDictionary[WholeScan, bytes] = weakref.WeakKeyDictionary()

@@ -43,6 +43,7 @@ class Missed:
     points: np.ndarray  #: (K, 3) in the frame of the grid [scan unit]
     colour: np.ndarray  #: (3,)
     framed: bool  #: whether the picture is made to hold them; outliers may lie anywhere
+    kind: str = ""  #: that of `LeftOut`
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +82,6 @@ def shown_points(grid: Grid, cloud: PointCloud) -> Shown:
         left[which] = True
         if kind in COLOUR_OF_PART:
             words = f"{len(which):,} points: {KINDS_LEFT_OUT[kind]}"
-            missed.append(Missed(words, points[which], COLOUR_OF_PART[kind], kind not in ("outliers", "sparse")))
+            missed.append(Missed(words, points[which], COLOUR_OF_PART[kind], kind not in ("outliers", "sparse"), kind))
     unread = tuple(f"{count:,} points: {words}, not shown" for words, count in samples.unread)
     return Shown(points[~left], tuple(missed), unread)

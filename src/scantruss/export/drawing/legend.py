@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
+from textwrap import wrap
 from typing import NamedTuple
 
 import numpy as np
@@ -21,6 +23,11 @@ LEAST_LEFT_BY_LEGEND = (
     0.2  # share of the width and height of a picture that is left to the grid however long the legend is
 )
 BAR_SHARE = 0.18  # largest share of the width that a scale bar takes
+UNPLACED_SIGN = "!"  # before the words of a fault or warning that is marked at no place
+RING_SIZE, SMALL_RING_SIZE = 1.6, 0.8  # diameters of a ring at the worst place of a kind, and at further ones [em]
+NUMBER_TURNS = (0.65, -0.65, 2.5, -2.5, 1.57, -1.57, 0.0, 3.14)  # directions in which a number may stand beside a ring
+NEAR_NUMBER = 1.6  # distance of a small ring from its number beside another ring, that stands for both [em]
+LEAST_APART = 0.9  # between two numbers, and between a number and a ring of another place [em]
 
 
 class Text(NamedTuple):
@@ -32,6 +39,7 @@ class Text(NamedTuple):
     size: float  #: [pixel]
     align: str = "center"
     colour: np.ndarray = INK_COLOUR  #: (3,)
+    over: bool = False  #: it is written over what is shown, and has an edge of paper
 
 
 class Row(NamedTuple):
@@ -94,6 +102,18 @@ class Mark:
     where: Place  #: in the scan's own frame
     colour: np.ndarray  #: (3,)
     also: tuple[Place, ...] = ()  #: more such places
+    kind: str = ""  #: of the fault or warning
+
+
+def wrapped_rows(rows: Iterable[Row], wide: float, em: float) -> list[Row]:
+    """Return the rows of a legend in lines no wider than a picture [pixel]; further lines of a row stand below its words."""
+    most = max(int((wide / em - LEGEND_SIGN) / LEGEND_LETTER), 20)
+    lines = []
+    for row in rows:
+        first, *more = wrap(row.words, most) or [""]
+        below = row.sign and " "
+        lines += [row._replace(words=first), *(Row(words, below, row.colour) for words in more)]
+    return lines
 
 
 def places_marked(grid: Grid) -> list[Mark]:
@@ -103,7 +123,9 @@ def places_marked(grid: Grid) -> list[Mark]:
         return []
     marks = []
     for kind, colour in ((found.faults, FAULT_COLOUR), (found.warnings, WARNING_SIGN_COLOUR)):
-        placed = [Mark(fault.words, fault.where, colour, fault.also) for fault in kind if fault.where is not None]
+        placed = [
+            Mark(fault.words, fault.where, colour, fault.also, fault.kind) for fault in kind if fault.where is not None
+        ]
         marks += placed[:MOST_MARKS]
     warned = {mark.where for mark in marks}
     unit = f" {grid.unit}" if grid.unit else ""
@@ -122,6 +144,54 @@ def places_marked(grid: Grid) -> list[Mark]:
         for name, figure, words in worst
         if figure
     ]
+
+
+def rows_of_marks(grid: Grid) -> list[Row]:
+    """Return what the numbers in a picture mean, then the faults and warnings that no number stands for: nothing is left out."""
+    marks, found = places_marked(grid), grid.certificate
+    rows = [Row(mark.words, str(number), mark.colour) for number, mark in enumerate(marks, 1)]
+    marked = {(mark.words, mark.where) for mark in marks}
+    for kind, colour in () if found is None else ((found.faults, FAULT_COLOUR), (found.warnings, WARNING_SIGN_COLOUR)):
+        rows += [Row(each.words, UNPLACED_SIGN, colour) for each in kind if (each.words, each.where) not in marked]
+    return rows
+
+
+def rings_and_numbers(grid: Grid, camera: Camera, em: float) -> tuple[list[Ring], list[Text]]:
+    """Return a ring at each place to look at, small at further places of a kind, and its number beside each.
+
+    Small rings that lie together share a number.
+    """
+    rings: list[Ring] = []
+    words: list[str] = []
+    for number, mark in enumerate(places_marked(grid), 1):
+        flat, _ = camera.project(np.array([mark.where, *mark.also]) - grid.origin)
+        sizes = [RING_SIZE * em, *[SMALL_RING_SIZE * em] * len(mark.also)]
+        rings += [Ring(x, y, size, mark.colour) for (x, y), size in zip(flat.tolist(), sizes, strict=True)]
+        words += [str(number)] * len(flat)
+    texts: list[Text] = []
+    for ring, word in zip(rings, words, strict=True):
+        small = ring.size < RING_SIZE * em
+        near = [text for text in texts if math.hypot(text.x - ring.x, text.y - ring.y) < NEAR_NUMBER * em]
+        if small and any(text.words == word for text in near):
+            continue
+        x, y = _beside(ring, rings, texts, em)
+        texts.append(Text(x, y, word, (0.8 if small else 1.0) * em, colour=ring.colour, over=True))
+    return rings, texts
+
+
+def _beside(ring: Ring, rings: list[Ring], texts: list[Text], em: float) -> tuple[float, float]:
+    """Return where the number of a ring stands: the first place beside it that is free, else the freest."""
+    taken = np.array([(text.x, text.y, 0.0) for text in texts] + [(r.x, r.y, 0.5 * r.size) for r in rings])
+    best, most = (ring.x, ring.y), -math.inf
+    for turn in NUMBER_TURNS:
+        away = 0.5 * ring.size + 0.75 * em
+        x, y = ring.x + away * math.cos(turn), ring.y + away * math.sin(turn)
+        free = float((np.hypot(taken[:, 0] - x, taken[:, 1] - y) - taken[:, 2]).min())
+        if free >= LEAST_APART * em:
+            return x, y
+        if free > most:
+            best, most = (x, y), free
+    return best
 
 
 def round_bar(longest: float) -> float:

@@ -15,14 +15,25 @@ import numpy as np
 
 from ...errors import words_of_number
 from ...grid.grid import Grid
-from ...grid.upward import known_upward
+from ...grid.upward import known_upward, picture_notes
 from ...runtime.files import write_files
 from ...runtime.ours import MADE_BY
 from ...runtime.places import check_place
 from ...scan.cloud import PointCloud
-from .camera import Camera, choose_camera
+from .camera import choose_camera
 from .left_out import Shown, shown_points
-from .legend import FAULT_COLOUR, Legend, Ring, Row, Text, places_marked, scale_bar
+from .legend import (
+    FAULT_COLOUR,
+    Legend,
+    Ring,
+    Row,
+    Text,
+    places_marked,
+    rings_and_numbers,
+    rows_of_marks,
+    scale_bar,
+    wrapped_rows,
+)
 from .strokes import (
     INK_COLOUR,
     MOST_POINTS,
@@ -73,7 +84,8 @@ def encode_picture(
     lines: list[np.ndarray] = []
     if len(grid.triangles):
         shown = shown_points(grid, cloud) if cloud is not None else None
-        legend = Legend(_legend_rows(grid, shown) if caption else [], (6 * em, tall - 3.7 * em), em)
+        rows = wrapped_rows(_legend_rows(grid, cloud, shown), wide - 12 * em, em) if caption else []
+        legend = Legend(rows, (6 * em, tall - 4.1 * em), em)
         width = wide / len(style.views)
         for number, name in enumerate(style.views):
             camera = choose_camera(grid.nodes, grid.triangles, known_upward(grid, cloud), name)
@@ -95,7 +107,8 @@ def encode_picture(
             if caption:
                 line, words = scale_bar(view.camera, box[2], 4.7 * em, width, grid.unit, em)
                 lines, texts = [*lines, line], [*texts, words]
-                rings += _rings(grid, view.camera, em, texts)
+                more_rings, numbers = rings_and_numbers(grid, view.camera, em)
+                rings, texts = [*rings, *more_rings], [*texts, *numbers]
                 if len(style.views) > 1:
                     texts.append(Text(width * (number + 0.5), tall - 2.5 * em, name, 1.2 * em))
         texts += legend.texts
@@ -109,29 +122,15 @@ def plot_grid(grid: Grid, cloud: PointCloud | None, views: tuple[str, ...], size
     return open_image(io.BytesIO(encode_picture(grid, cloud, style=PictureStyle(views=views, size=size))))
 
 
-def _rings(grid: Grid, camera: Camera, em: float, texts: list[Text]) -> list[Ring]:
-    """Return rings at the places to look at, and add their numbers to the texts."""
-    marks = places_marked(grid)
-    if not marks:
-        return []
-    flat, _ = camera.project(np.array([mark.where for mark in marks]) - grid.origin)
-    for number, (mark, (x, y)) in enumerate(zip(marks, flat.tolist(), strict=True), 1):
-        texts.append(Text(x + 1.3 * em, y + 1.0 * em, str(number), em, colour=mark.colour))
-    rings = [Ring(x, y, 1.6 * em, mark.colour) for mark, (x, y) in zip(marks, flat.tolist(), strict=True)]
-    for mark in marks:
-        if mark.also:
-            others, _ = camera.project(np.array(mark.also) - grid.origin)
-            rings += [Ring(x, y, 0.8 * em, mark.colour) for x, y in others.tolist()]
-    return rings
-
-
-def _legend_rows(grid: Grid, shown: Shown | None) -> list[Row]:
+def _legend_rows(grid: Grid, cloud: PointCloud | None, shown: Shown | None) -> list[Row]:
     """Return what colours and numbers mean, line by line."""
     failed = grid.certificate is not None and not grid.certificate.passed
     rows = [Row("This grid fails its certificate:", "", FAULT_COLOUR)] * failed
-    rows += [Row(part.words, "\u25cf", part.colour) for part in (shown.missed if shown else ())]
+    for part in shown.missed if shown else ():
+        numbers = [str(number) for number, mark in enumerate(places_marked(grid), 1) if mark.kind == part.kind]
+        rows.append(Row(f"{part.words}{', at ' if numbers else ''}{', '.join(numbers)}", "\u25cf", part.colour))
     rows += [Row(words) for words in (shown.unread if shown else ())]
-    return rows + [Row(mark.words, str(number), mark.colour) for number, mark in enumerate(places_marked(grid), 1)]
+    return [*rows, *rows_of_marks(grid), *(Row(words) for words in picture_notes(grid, cloud))]
 
 
 def encode_cloud(cloud: PointCloud) -> bytes:
@@ -217,6 +216,7 @@ def paint(
     """Return the picture as PNG: strokes back to front, then lines (N, 2) [pixel], rings and texts."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
+    from matplotlib.patheffects import withStroke
 
     figure = Figure(figsize=(size[0] / 100, size[1] / 100), dpi=100, facecolor=tuple(PAPER_COLOUR))
     canvas: Any = FigureCanvasAgg(figure)
@@ -229,9 +229,10 @@ def paint(
     for ring in rings:
         axes.plot([ring.x], [ring.y], "o", markersize=0.72 * ring.size, markeredgecolor=tuple(ring.colour),
                   markerfacecolor="none", markeredgewidth=1.6)  # fmt: skip
+    edge = [withStroke(linewidth=2.2, foreground=tuple(PAPER_COLOUR))]
     for text in texts:
         axes.text(text.x, text.y, text.words, fontsize=text.size * 0.72, color=tuple(text.colour), ha=text.align,
-                  va="center", family="DejaVu Sans", parse_math=False)  # fmt: skip
+                  va="center", family="DejaVu Sans", parse_math=False, path_effects=edge if text.over else None)  # fmt: skip
     stream = io.BytesIO()
     canvas.print_png(stream, metadata={"Software": MADE_BY})  # unlike savefig it asks no settings of the user
     return stream.getvalue()

@@ -25,6 +25,12 @@ CLAY_COLOURS = (np.array([0.130, 0.165, 0.220]), np.array([0.640, 0.690, 0.720])
 PRINT_COLOURS = (np.array([0.520, 0.170, 0.090]), np.array([0.990, 0.640, 0.420]))  # a printed model
 FIXED_NODE_COLOUR = np.array([0.851, 0.290, 0.180])  # fixed nodes
 COLOUR_BEHIND = 0.25  # how much of its colour is left to what lies behind the grid
+COLOUR_BEFORE = 0.2  # the same of what was left out and lies between the eye and the grid, as a floor seen from below
+COLOUR_THROUGH = 0.4  # the same of what is shown through the grid
+MISSED_DOT = 3.0  # width of the dot of a point that is left out [pixel]
+MOST_HIDDEN = 0.05  # share of the grid that they may hide before they are faint
+PIXELS_OF_MAP = 4  # of the picture, in a pixel of the map of what is in front
+LEAST_SEEN = 0.1  # share of some points below which they are shown through the grid that hides them
 
 
 @dataclass(frozen=True, eq=False)
@@ -224,16 +230,37 @@ def dot_strokes(points: np.ndarray, member: float, view: CameraView, *, over: bo
 def missed_strokes(
     points: np.ndarray, colour: np.ndarray, view: CameraView, box: tuple[float, float, float, float]
 ) -> Strokes:
-    """Return points that the grid leaves out (N, 3) in a colour (3,), as far as they lie in a box; faint where they lie behind the grid."""
+    """Return points that the grid leaves out (N, 3) in a colour (3,), as far as they lie in a box.
+
+    They are faint where they lie before the grid and hide much of it, and shown through the grid where it hides nearly all of them.
+    """
     flat, near = view.camera.project(some_of(points, MOST_POINTS[True]))
     shown = ((flat >= box[:2]) & (flat <= box[2:])).all(axis=1)
     flat, near = flat[shown], near[shown]
-    inside, _, nearest = _in_front(flat, view)
+    inside, triangle, nearest = _in_front(flat, view)
+    covers = inside & (triangle >= 0)
+    behind, before = covers & (near < nearest), covers & (near > nearest)
+    through = bool(len(flat)) and 1.0 - float(behind.mean()) < LEAST_SEEN
+    hides = len(_cells_of(flat[before])) * MISSED_DOT**2 > MOST_HIDDEN * PIXELS_OF_MAP * (view.front >= 0).sum()
     shown = np.broadcast_to(np.concatenate([colour, [1.0]]), (len(flat), 4)).copy()
-    shown[:, 3] = np.where(inside & (near < nearest), COLOUR_BEHIND, 1.0)
-    return Strokes(
-        near + 1e-6 * view.camera.distance, _dots(flat), np.zeros_like(shown), shown, np.full(len(flat), 3.0)
-    )
+    shown[behind, 3] = _faint(flat[behind], COLOUR_THROUGH)
+    shown[before, 3] = _faint(flat[before], COLOUR_BEFORE) if hides else 1.0
+    key = near + 1e-6 * view.camera.distance
+    if through:
+        key[behind] = np.inf
+    return Strokes(key, _dots(flat), np.zeros_like(shown), shown, np.full(len(flat), MISSED_DOT))
+
+
+def _faint(flat: np.ndarray, colour: float) -> float:
+    """Return how much of its colour each of some dots (N, 2) [pixel] has such that about so much is left where they lie on each other."""
+    on_each_other = len(flat) / max(len(_cells_of(flat)), 1)
+    return float(1.0 - (1.0 - colour) ** (1.0 / max(on_each_other, 1.0)))
+
+
+def _cells_of(flat: np.ndarray) -> np.ndarray:
+    """Return the cells (K, 2) as wide as a dot in which some dots (N, 2) [pixel] lie."""
+    cells: np.ndarray = np.unique(np.floor(flat / MISSED_DOT), axis=0)
+    return cells
 
 
 def _in_front(flat: np.ndarray, view: CameraView) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -50,6 +50,7 @@ def print_parts(
     sides: int = 12,
     marks: bool = False,
     keep_failed: bool = False,
+    force: bool = False,
 ) -> PrintedParts:
     """Write the grid in printed parts: cut to fit a bed with plug joints, or a ball with sockets for each node.
 
@@ -75,6 +76,8 @@ def print_parts(
         Engrave the mark of each node on its ball.
     keep_failed : bool
         Print a grid even if it failed its certificate.
+    force : bool
+        Whether to write over files that ScanTruss did not write.
 
     Raises
     ------
@@ -125,7 +128,7 @@ def print_parts(
         contents[path.with_name(f"{path.stem}_{name}{path.suffix}")] = _encode(plate, path.suffix.lower())
     if sockets:
         contents[path.with_name(f"{path.stem}_rods.csv")] = _rods(grid, floor, scale)
-    write_files(contents)
+    write_files(contents, force=force)
     solids = [solid for _, plate in named for _, solid in plate]
     sizes = np.array([np.ptp(solid.vertices, axis=0) for solid in solids])
     lost = [name for _, plate in named for name, solid in plate if solid.notes]

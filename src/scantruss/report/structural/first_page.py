@@ -38,6 +38,10 @@ def first_page(source: ReportSource) -> Iterator[ReportPart]:
         yield Sentence(f"Warning: {words}", warns=True)
     if report.utilization is not None and not report.warnings:
         yield Sentence("Every check that is listed below is met.")
+    if source.of_grid:
+        yield SectionHead("Certificate of the grid")
+        yield Sentence("Warning: the grid of which the structure was made has places to look at:", warns=True)
+        yield PointList(tuple(source.of_grid))
     yield SectionHead("Assumptions")
     stability = report.buckling is not None or report.path is not None
     yield PointList(tuple(_assumptions(truss, settings, stability)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +21,7 @@ class ReportSource:
     settings: StructureSettings
     solution: Solution
     report: StructureReport
+    of_grid: Sequence[str] = ()  #: faults and warnings of the certificate of the grid
 
 
 def cases_of_state(report: StructureReport, state: str) -> list[CaseFigures]:

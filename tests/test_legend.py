@@ -1,0 +1,124 @@
+"""What stands in a picture beside the grid: every warning, numbers at the places, which axis is shown up, what is left out faintly."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from small_grids import cloud_over, dome, icosahedron
+from test_picture import has_colour, pixels
+from typed import xyz
+
+import scantruss as st
+from scantruss.export.drawing import picture
+from scantruss.export.drawing.camera import choose_camera
+from scantruss.export.drawing.left_out import NO_GRID_COLOUR, Missed, Shown
+from scantruss.export.drawing.picture import encode_picture
+from scantruss.export.drawing.style import PictureStyle
+from scantruss.grid.certificate import Certificate, Fault, LeftOut
+from scantruss.grid.upward import guessed_up, known_upward
+
+NOTHING_FOUND = Certificate("", 1.0, True, True, 1, 1, 1, 1, 1, 0)
+
+
+def texts_of(
+    grid: st.Grid, monkeypatch: pytest.MonkeyPatch, cloud: st.PointCloud | None = None, **style: Any
+) -> list[Any]:
+    """The words in a picture of a grid."""
+    painted: list[Any] = []
+
+    def paint(*given: Any) -> bytes:
+        painted.append(given)
+        return b""
+
+    monkeypatch.setattr(picture, "paint", paint)
+    encode_picture(grid, cloud, style=PictureStyle(**style))
+    return list(painted[0][2])
+
+
+def turned_over(grid: st.Grid) -> st.Grid:
+    """The same sheet with triangles that look down, as those of a net between masts or of a pit."""
+    return grid.replace(nodes=grid.nodes * [1.0, 1.0, -1.0], triangles=grid.triangles)
+
+
+@pytest.mark.parametrize("axis", [1, 2])
+def test_a_sheet_that_faces_down_hangs_and_is_not_turned_over(axis: int) -> None:
+    """A net between masts, a bowl and a quarry face down: y or z of their files is up all the same."""
+    grid = dome(unit="mm")
+    hung = grid.replace(nodes=np.roll(grid.nodes, axis - 2, axis=1), triangles=grid.triangles[:, ::-1])
+    assert choose_camera(hung.nodes, hung.triangles).ground @ np.eye(3)[axis] == pytest.approx(1.0)
+    assert guessed_up(hung) == ("" if axis == 2 else "y")
+    assert guessed_up(turned_over(grid)) == ""
+
+
+def test_a_level_floor_under_a_grid_tells_that_z_is_up() -> None:
+    body = icosahedron()
+    body = body.replace(nodes=body.nodes * [1.0, 2.0, 1.0])
+    assert known_upward(body, None) is None
+    on_floor = replace(NOTHING_FOUND, left_out=(LeftOut("floor", 900, 0.2, (0.0, 0.0, -9.0), 30.0),))
+    assert guessed_up(body.replace(certificate=on_floor)) == ""
+
+
+def test_a_picture_with_a_guessed_axis_up_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    body = icosahedron()
+    body = body.replace(nodes=body.nodes * [1.0, 2.0, 1.0])
+    assert any("shows y up" in text.words for text in texts_of(body, monkeypatch))
+    assert not any("up" in text.words for text in texts_of(dome(unit="m"), monkeypatch))
+
+
+@pytest.mark.parametrize("views", [("auto",), ("auto", "top")])
+def test_every_warning_is_in_the_legend(views: tuple[str, ...], monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also those without a place, more than are marked, and longer than the picture is wide."""
+    grid = dome()
+    warnings = [Fault("gap", f"bridges gap {k}", xyz(node)) for k, node in enumerate(grid.nodes[:8])]
+    warnings += [Fault("aside", "leaves out 10.8% of the points"), Fault("unfollowed", "follows not " + 60 * "a rib ")]
+    texts = texts_of(
+        grid.replace(certificate=replace(NOTHING_FOUND, warnings=tuple(warnings))), monkeypatch, views=views
+    )
+    said = " ".join(text.words for text in texts if text.align == "left" and text.words.strip())
+    assert all(warning.words.strip() in said for warning in warnings)
+    wide = PictureStyle(views=views).size or (picture.PICTURE_SIZE if len(views) == 1 else picture.PANELS_SIZE)
+    assert all(text.x + 0.62 * text.size * len(text.words) < wide[0] for text in texts if text.align == "left")
+
+
+def test_each_ring_has_the_number_of_its_warning(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Small ones too, and two at one place have numbers that do not lie on each other."""
+    grid = dome()
+    one, two, three = (xyz(node) for node in grid.nodes[[20, 70, 110]])
+    found = (Fault("gap", "bridges a gap", one, (two, three)), Fault("missed", "cuts off a corner", one))
+    texts = texts_of(grid.replace(certificate=replace(NOTHING_FOUND, warnings=found)), monkeypatch)
+    numbers = [text for text in texts if text.over]
+    assert sorted(text.words for text in numbers) == ["1", "1", "1", "2"]
+    places = np.array([(text.x, text.y) for text in numbers])
+    apart = np.linalg.norm(places[:, None] - places[None], axis=2) + 1e9 * np.eye(4)
+    assert apart.min() > 0.9 * numbers[0].size
+
+
+def test_the_legend_says_at_which_number_points_lie_far_off(monkeypatch: pytest.MonkeyPatch) -> None:
+    grid, cloud = dome(), cloud_over(dome())
+    far = Missed("9 points: farther than a member from the grid", grid.nodes[:9], NO_GRID_COLOUR, True, "far")
+    monkeypatch.setattr(picture, "shown_points", lambda *_: Shown(grid.nodes, (far,)))
+    found = replace(NOTHING_FOUND, warnings=(Fault("far", "misses 9 points", xyz(grid.nodes[0])),))
+    texts = texts_of(grid.replace(certificate=found), monkeypatch, cloud)
+    assert any(text.words.endswith("from the grid, at 1") for text in texts)
+
+
+def test_a_floor_before_the_grid_does_not_hide_it_and_a_column_behind_it_is_seen(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    grid, cloud = dome(unit="m"), cloud_over(dome(unit="m"))
+    rng = np.random.default_rng(4)
+    floor = np.column_stack([rng.uniform(-15, 15, (9000, 2)), np.full(9000, -9.0)])
+    column = np.column_stack([rng.uniform(-0.5, 0.5, (2000, 2)), rng.uniform(-6.0, -1.0, 2000)])
+    bare = pixels(encode_picture(grid, None, caption=False, style=PictureStyle(views=("bottom",))))
+    for points, view in ((floor, "bottom"), (column, "top")):
+        shown = Shown(grid.nodes, (Missed("floor", points, NO_GRID_COLOUR, False, "floor"),))
+        monkeypatch.setattr(picture, "shown_points", lambda *_, shown=shown: shown)
+        drawn = pixels(encode_picture(grid, cloud, caption=False, style=PictureStyle(views=(view,))))
+        middle = drawn[550:650, 750:850]
+        assert has_colour(middle, NO_GRID_COLOUR) == 0
+        if view == "bottom":
+            assert np.abs(middle - bare[550:650, 750:850]).mean() < 40
+        else:
+            towards = np.abs(middle - 255 * NO_GRID_COLOUR).sum(axis=2)
+            assert (towards < np.abs(bare[550:650, 750:850] - 255 * NO_GRID_COLOUR).sum(axis=2).min()).mean() > 0.02
