@@ -24,6 +24,7 @@ from .surface.sharp_edges import EDGE_SHARE, FEWEST_NEEDED
 from .surface.supports import are_columns
 
 if TYPE_CHECKING:
+    from .grid.certificate import Certificate
     from .grid.grid import Grid
     from .scan.cloud import PointCloud
     from .settings import Settings
@@ -42,6 +43,9 @@ FAR_FROM_PASSING = 12  # cuts and missing boundary loops above which other front
 # share of the scan that a grid misses above which other fronts do not help either, in shares that may be missing; of thin limbs 1
 FAR_MISSING = 2.0
 BESIDE_RODS = 0.5  # distance from a rod within which the place of a warning is beside it [member lengths]
+# by how much nearer a hundredth of the points must lie, in members, where members are unevener by 1 (std of their lengths / mean)
+NEARER_FOR_UNEVENER = 2.0
+POOR_MEMBERS = {"angle", "short", "long", "folded"}  # kinds of warnings
 MOST_RUNS = 24  # grids that are made at most, before a scan is refused
 MOST_RUNS_OF_CELLS = 3  # grids of quads or hexagons that are made at most; they are made of triangles that pass
 MOST_FAR, MOST_GIVEN_UP = 2, 3  # attempts in a row of the same settings that are so far from passing, and such settings
@@ -58,6 +62,7 @@ class Attempt:
         None  #: how its fronts are laid out; None: as the effort of the settings allows
     )
     faults: tuple[tuple[float, float, float], ...] = ()  #: places at which ridges are given up [scan unit]
+    wide: tuple[int, ...] = ()  #: numbers of the wide folds that are ridges too, see `constraints.ridges.find_ridges`
     is_trial: bool = False  #: whether all that counts is that a grid passes
 
     def after(self, fault: FrontError, cloud: PointCloud) -> Attempt | None:
@@ -76,7 +81,7 @@ class Attempt:
         """Return by how many points the ridges go that this attempt follows."""
         settings = settings_of_triangles(self.settings)
         samples, _ = find_boundary(sample_surface(cloud, settings), settings)
-        return sum(len(ridge.places) for ridge in ridges_away_from(self.faults, samples, settings))
+        return sum(len(ridge.places) for ridge in ridges_away_from(self.faults, samples, settings, self.wide))
 
     def advice(self, fault: ScanTrussError) -> str:
         """Say with which settings a grid passes that only leaves out too much: of the mean surface, or without thin limbs; else nothing."""
@@ -165,6 +170,28 @@ def runs_along_rods(grid: Grid, cloud: PointCloud, settings: Settings) -> bool:
     return bool(len(rods)) and any(
         bool((np.linalg.norm(rods - place, axis=1) < BESIDE_RODS * settings.length).any()) for place in places
     )
+
+
+def follows_better(grid: Grid, other: Grid) -> bool:
+    """Whether a grid is nearer to the scan than another one, by more than it is unevener, and no poorer; both have certificates."""
+    found, known = grid.certificate, other.certificate
+    if found is None or known is None or found.scan_distance is None or known.scan_distance is None:
+        return False
+    if _poor_members(found) > _poor_members(known):
+        return False
+    nearer = (known.scan_distance.p99 - found.scan_distance.p99) / found.reach / 2.0
+    return nearer > NEARER_FOR_UNEVENER * max(_variation(grid) - _variation(other), 0.0)
+
+
+def _poor_members(certificate: Certificate) -> int:
+    """Return of how many kinds the warnings are that say of members or triangles that they are poor."""
+    return len({warning.kind for warning in certificate.warnings} & POOR_MEMBERS)
+
+
+def _variation(grid: Grid) -> float:
+    """Return the standard deviation of the member lengths over their mean, or over the lengths desired there."""
+    quality = grid.quality
+    return quality.length_cv if quality.stretch_cv is None else quality.stretch_cv
 
 
 def only_leaves_out(fault: ScanTrussError) -> TypeGuard[CertificateError]:

@@ -3,18 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from time import perf_counter
 
 import numpy as np
 
-from .attempts import Attempt, AttemptLimit, attempts, joins_sheets, only_leaves_out, runs_along_rods
+from .attempts import (
+    Attempt,
+    AttemptLimit,
+    attempts,
+    follows_better,
+    joins_sheets,
+    only_leaves_out,
+    runs_along_rods,
+)
 from .boundary.find import find_boundary
 from .candidates import advance_fronts, best_that_passes, improve_fronts
 from .cells.make import certified_cells, settings_of_triangles, with_cells
 from .check.limits import with_ridges_given_up
-from .constraints.find import find_constraints
+from .constraints.find import find_constraints, wide_folds, wide_folds_cut_off
 from .errors import CertificateError, FrontError, OneSidedError, ScanTrussError
 from .front.orientation_field import orientation_fields
 from .grid.grid import Grid
@@ -244,7 +253,8 @@ def first_that_passes(
         if not limit.allows(attempt):
             continue
         try:
-            grid = make_grid_with_most_ridges(cloud, attempt, limit, progress=progress)
+            make = make_grid_with_wide_ridges if attempt == Attempt(settings) else make_grid_with_most_ridges
+            grid = make(cloud, attempt, limit, progress=progress)
             return without_rods_if_better(grid, cloud, attempt, limit, progress=progress)
         except ScanTrussError as error:
             looks_one_sided = bool(faults) and isinstance(faults[0], OneSidedError)  # where its mean surface does not
@@ -264,6 +274,30 @@ def first_that_passes(
     if advice and isinstance(worst, FrontError) and not only_leaves_out(worst):
         raise type(worst)(f"{worst}; {advice}", worst.grid, worst.where)
     raise worst
+
+
+def make_grid_with_wide_ridges(
+    cloud: PointCloud, attempt: Attempt, limit: AttemptLimit, *, progress: Progress | None = None
+) -> Grid:
+    """Return the grid of one attempt; where it cuts off the crests of wide folds, with ridges there, if that follows the scan better.
+
+    For effort `best` a grid of effort `normal` shows it, so that the longer search starts from no worse.
+    """
+    settings = settings_of_triangles(attempt.settings)
+    samples, _ = find_boundary(sample_surface(cloud, settings), settings)
+    if not wide_folds(samples, settings):
+        return make_grid_with_most_ridges(cloud, attempt, limit, progress=progress)
+    lower = replace(attempt, settings=attempt.settings.replace(effort="normal"))
+    first = lower if attempt.settings.effort == "best" else attempt
+    plain = make_grid_with_most_ridges(cloud, first, limit, progress=progress)
+    chosen, found = first, plain
+    with suppress(ScanTrussError):
+        wide = replace(first, wide=wide_folds_cut_off(plain, samples, settings))
+        other = make_grid_with_most_ridges(cloud, wide, limit, progress=progress) if wide.wide else plain
+        chosen, found = (wide, other) if follows_better(other, plain) else (first, plain)
+    if first is attempt:
+        return found
+    return make_grid_with_most_ridges(cloud, replace(attempt, wide=chosen.wide), limit, progress=progress)
 
 
 def without_rods_if_better(
@@ -312,7 +346,9 @@ def make_grid(cloud: PointCloud, attempt: Attempt, *, progress: Progress | None 
     settings = settings_of_triangles(wanted)
     samples = sample_surface(cloud, settings)  # Sec. 3.2: samples of the surface with normals, Eq. 1
     samples, boundary = find_boundary(samples, settings, progress=progress)  # Sec. 3.3; holes, Sec. 3.6
-    boundary, constraints = find_constraints(samples, boundary, settings, attempt.faults)  # Sec. 4.2, lines, ridges
+    boundary, constraints = find_constraints(
+        samples, boundary, settings, attempt.faults, attempt.wide
+    )  # Sec. 4.2, lines, ridges
     fields = orientation_fields(samples, boundary, settings, attempt.starts)  # Jakob et al. 2015
     fronts = advance_fronts(samples, boundary, constraints, fields, settings, progress=progress)  # Fig. 4
     improved = improve_fronts(fronts, samples, boundary, constraints, settings, progress=progress)  # Sec. 4.1
