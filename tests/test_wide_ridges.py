@@ -11,7 +11,8 @@ from marks import compiled_only
 from scantruss import Grid, PointCloud, Settings, grid_from_points
 from scantruss.attempts import Attempt, follows_better
 from scantruss.boundary.find import find_boundary
-from scantruss.constraints.find import wide_folds_cut_off
+from scantruss.check.unfollowed import crests_cut_off
+from scantruss.constraints.find import wide_folds
 from scantruss.constraints.ridges import find_ridges, fold_lines
 from scantruss.grid.certificate import Fault
 from scantruss.pipeline import make_grid
@@ -58,10 +59,9 @@ def test_a_box_has_all_of_its_wide_edges_or_none(cloud: PointCloud) -> None:
     settings = Settings(length=SIZE)
     samples, _ = find_boundary(sample_surface(cloud, settings), settings)
     plain = make_grid(cloud, Attempt(settings))
-    cut = wide_folds_cut_off(plain, samples, settings)
-    assert cut in ((), tuple(range(len(fold_lines(samples, settings).wide))))
-    without = settings.replace(ridge_angle=0.0)
-    assert wide_folds_cut_off(plain, samples, without) == ()
+    crests = wide_folds(samples, settings)
+    assert crests_cut_off(plain, crests, SIZE) in ((), tuple(range(len(crests))))
+    assert wide_folds(samples, settings.replace(ridge_angle=0.0)) == []
 
 
 @compiled_only

@@ -23,7 +23,8 @@ from .boundary.find import find_boundary
 from .candidates import advance_fronts, best_that_passes, improve_fronts
 from .cells.make import certified_cells, settings_of_triangles, with_cells
 from .check.limits import with_ridges_given_up
-from .constraints.find import find_constraints, wide_folds, wide_folds_cut_off
+from .check.unfollowed import crests_cut_off
+from .constraints.find import find_constraints, wide_folds
 from .errors import CertificateError, FrontError, OneSidedError, ScanTrussError
 from .front.orientation_field import orientation_fields
 from .grid.grid import Grid
@@ -285,14 +286,15 @@ def make_grid_with_wide_ridges(
     """
     settings = settings_of_triangles(attempt.settings)
     samples, _ = find_boundary(sample_surface(cloud, settings), settings)
-    if not wide_folds(samples, settings):
+    crests = wide_folds(samples, settings)
+    if not crests:
         return make_grid_with_most_ridges(cloud, attempt, limit, progress=progress)
     lower = replace(attempt, settings=attempt.settings.replace(effort="normal"))
     first = lower if attempt.settings.effort == "best" else attempt
     plain = make_grid_with_most_ridges(cloud, first, limit, progress=progress)
     chosen, found = first, plain
     with suppress(ScanTrussError):
-        wide = replace(first, wide=wide_folds_cut_off(plain, samples, settings))
+        wide = replace(first, wide=crests_cut_off(plain, crests, settings.length))
         other = make_grid_with_most_ridges(cloud, wide, limit, progress=progress) if wide.wide else plain
         chosen, found = (wide, other) if follows_better(other, plain) else (first, plain)
     if first is attempt:

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..boundary.find import Boundary, with_line_ends
-from ..check.distances import distances_to_grid
 from ..errors import Place
 from ..kernels.mesh.point_location import nearest_sample
 from .fixed_lines import add_polylines
@@ -20,14 +19,8 @@ from .ridges import add_ridges, cut_around, find_ridges, fold_lines, without
 from .ridges_at_boundary import with_ridge_ends
 
 if TYPE_CHECKING:
-    from ..grid.grid import Grid
     from ..settings import Settings
     from ..surface.samples import SurfaceSamples
-
-
-CREST_OFF = 0.1  # distance of the crest of a wide fold from a grid from which on this cuts it off [member lengths]
-SHARE_OF_CREST = 0.6  # of its places may be nearer
-MEETS_WITHIN = 1.5  # distance of the ends of two wide folds within which they meet in a corner [member lengths]
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,23 +94,9 @@ def wanted_ridges(samples: SurfaceSamples, settings: Settings, wide: tuple[int, 
 
 
 def wide_folds(samples: SurfaceSamples, settings: Settings) -> list[np.ndarray]:
-    """Return the lines of folds that turn over nearly a member, each (K,) FOLD; none where no ridges are wanted."""
+    """Return the places (K, 3) along each line of folds that turn over nearly a member; none where no ridges are wanted."""
     wanted = settings.ridge_angle > 0.0 and settings.method == "default" and not samples.smooth
-    return fold_lines(samples, settings).wide if wanted else []
-
-
-def wide_folds_cut_off(grid: Grid, samples: SurfaceSamples, settings: Settings) -> tuple[int, ...]:
-    """Return the numbers of the wide folds whose crests a grid cuts off, and of those that meet them; see `ridges.find_ridges`."""
-    lines = wide_folds(samples, settings)
-    off = [np.quantile(distances_to_grid(folds["place"], grid, settings.length)[0], SHARE_OF_CREST) for folds in lines]
-    chosen = [number for number in range(len(lines)) if off[number] > CREST_OFF * settings.length]
-    for number in chosen:  # each is added once; a box has all of its edges or none
-        ends = lines[number]["place"][[0, -1]]
-        for other, folds in enumerate(lines):
-            gaps = np.linalg.norm(ends[:, None] - folds["place"][[0, -1]], axis=2)
-            if other not in chosen and gaps.min() < MEETS_WITHIN * settings.length:
-                chosen.append(other)
-    return tuple(sorted(chosen))
+    return [folds["place"] for folds in fold_lines(samples, settings).wide] if wanted else []
 
 
 def _on_pieces(ridge: Ridge, samples: SurfaceSamples) -> bool:
