@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from time import perf_counter
@@ -11,13 +13,15 @@ import numpy as np
 
 from .attempts.course import AttemptCourse
 from .attempts.limit import AttemptLimit
+from .attempts.looks import follows_better
 from .attempts.table import Attempt
 from .boundary.find import find_boundary
 from .candidates import advance_fronts, best_that_passes, improve_fronts
 from .cells.make import settings_of_triangles, with_cells
 from .cells.symmetric_grids import symmetric_grid, symmetric_hexagons
-from .constraints.find import find_constraints
-from .errors import CertificateError, ScanTrussError
+from .check.unfollowed import crests_cut_off
+from .constraints.find import find_constraints, wide_folds
+from .errors import CertificateError, FrontError, ScanTrussError
 from .front.orientation_field import orientation_fields
 from .grid.grid import Grid
 from .runtime.progress import Progress, seer_of
@@ -136,7 +140,7 @@ def make_grid(cloud: PointCloud, attempt: Attempt, *, progress: Progress | None 
     settings = settings_of_triangles(wanted)
     samples = sample_surface(cloud, settings)  # Sec. 3.2: samples of the surface with normals, Eq. 1
     samples, boundary = find_boundary(samples, settings, progress=progress)  # Sec. 3.3; holes, Sec. 3.6
-    boundary, constraints = find_constraints(samples, boundary, settings, attempt.faults)  # Sec. 4.2, lines, ridges
+    boundary, constraints = find_constraints(samples, boundary, settings, attempt.faults, attempt.wide)  # Sec. 4.2
     fields = orientation_fields(samples, boundary, settings, attempt.starts)  # Jakob et al. 2015
     fronts = advance_fronts(samples, boundary, constraints, fields, settings, progress=progress)  # Fig. 4
     improved = improve_fronts(fronts, samples, boundary, constraints, settings, progress=progress)  # Sec. 4.1
@@ -144,6 +148,33 @@ def make_grid(cloud: PointCloud, attempt: Attempt, *, progress: Progress | None 
         improved, samples, boundary, constraints, settings, is_trial=attempt.is_trial, progress=progress
     )  # certificate
     return with_cells(best, samples, boundary, constraints, wanted, progress=progress)  # quads, hexagons
+
+
+def make_grid_with_wide_ridges(cloud: PointCloud, attempt: Attempt, *, progress: Progress | None = None) -> Grid:
+    """Return the grid of one attempt; where it cuts off the crests of wide folds, with ridges there, if that follows the scan better.
+
+    For effort `best` grids of effort `normal` decide it, so that the longer search starts from no worse.
+
+    Raises
+    ------
+    FrontError
+        No grid without such ridges passes the checks.
+    """
+    settings = settings_of_triangles(attempt.settings)
+    samples, _ = find_boundary(sample_surface(cloud, settings), settings)
+    crests = wide_folds(samples, settings)
+    if not crests:
+        return make_grid(cloud, attempt, progress=progress)
+    is_long = attempt.settings.effort == "best"
+    first = replace(attempt, settings=attempt.settings.replace(effort="normal")) if is_long else attempt
+    plain = make_grid(cloud, first, progress=progress)
+    wide = crests_cut_off(plain, crests, settings.length)
+    if wide:
+        with suppress(FrontError):
+            folded = make_grid(cloud, replace(first, wide=wide), progress=progress)
+            if follows_better(folded, plain):
+                return make_grid(cloud, replace(attempt, wide=wide), progress=progress) if is_long else folded
+    return make_grid(cloud, attempt, progress=progress) if is_long else plain
 
 
 def first_that_passes(
@@ -173,8 +204,9 @@ def first_that_passes(
     """
     course = AttemptCourse(cloud, settings, tried, limit)
     for attempt in course:
+        make = make_grid_with_wide_ridges if attempt == Attempt(settings) else make_grid
         try:
-            course.passed(attempt, make_grid(cloud, attempt, progress=progress))
+            course.passed(attempt, make(cloud, attempt, progress=progress))
         except ScanTrussError as error:
             course.failed(attempt, error)
     return course.outcome()

@@ -14,6 +14,7 @@ from ..surface.sharp_edges import EDGE_SHARE, FEWEST_NEEDED
 from ..surface.supports import are_columns
 
 if TYPE_CHECKING:
+    from ..grid.certificate import Certificate
     from ..grid.grid import Grid
     from ..scan.cloud import PointCloud
     from ..settings import Settings
@@ -23,6 +24,9 @@ ROUGH_SCAN, VERY_ROUGH_SCAN = 0.02, 0.25
 MANY_OUTLIERS = 0.002  # share of the points that must be outliers for a grid to be tried without them
 SAID_BESIDE_RODS = ("aside", "far", "peak")  # kinds of warnings of a grid that runs along rods, or misses them
 BESIDE_RODS = 0.5  # distance from a rod within which the place of a warning is beside it [member lengths]
+# by how much nearer a hundredth of the points must lie, in members, where members are unevener by 1 (std of their lengths / mean)
+NEARER_FOR_UNEVENER = 2.0
+POOR_MEMBERS = {"angle", "short", "long", "folded"}  # kinds of warnings
 
 
 class AskedScan:
@@ -153,3 +157,25 @@ def _stands_on_rods(cloud: PointCloud, settings: Settings) -> bool:
     if parts[1] > parts[0] or (cut.rough > VERY_ROUGH_SCAN and without.rough <= ROUGH_SCAN):
         return True
     return cloud.z_is_up and are_columns(without.scan[without.judged == ROD], without.surface.mean, settings.length)
+
+
+def follows_better(grid: Grid, other: Grid) -> bool:
+    """Whether a grid is nearer to the scan than another one, by more than it is unevener, and no poorer; both have certificates."""
+    found, known = grid.certificate, other.certificate
+    if found is None or known is None or found.scan_distance is None or known.scan_distance is None:
+        return False
+    if _poor_members(found) > _poor_members(known):
+        return False
+    nearer = (known.scan_distance.p99 - found.scan_distance.p99) / found.reach / 2.0
+    return nearer > NEARER_FOR_UNEVENER * max(_variation(grid) - _variation(other), 0.0)
+
+
+def _poor_members(certificate: Certificate) -> int:
+    """Return of how many kinds the warnings are that say of members or triangles that they are poor."""
+    return len({warning.kind for warning in certificate.warnings} & POOR_MEMBERS)
+
+
+def _variation(grid: Grid) -> float:
+    """Return the standard deviation of the member lengths over their mean, or over the lengths desired there."""
+    quality = grid.quality
+    return quality.length_cv if quality.stretch_cv is None else quality.stretch_cv

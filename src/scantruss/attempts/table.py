@@ -48,6 +48,7 @@ class Attempt:
         None  #: how its fronts are laid out; None: as the effort of the settings allows
     )
     faults: tuple[tuple[float, float, float], ...] = ()  #: places at which ridges are given up [scan unit]
+    wide: tuple[int, ...] = ()  #: numbers of the wide folds that are ridges too, see `constraints.ridges.find_ridges`
     is_trial: bool = False  #: whether all that counts is that a grid passes
     row: str = AS_ASKED  #: name of its row in the table
 
@@ -67,7 +68,7 @@ class Attempt:
         """Return by how many points the ridges go that this attempt follows."""
         settings = settings_of_triangles(self.settings)
         samples, _ = find_boundary(sample_surface(cloud, settings), settings)
-        return sum(len(ridge.places) for ridge in ridges_away_from(self.faults, samples, settings))
+        return sum(len(ridge.places) for ridge in ridges_away_from(self.faults, samples, settings, self.wide))
 
     def advice(self, fault: ScanTrussError) -> str:
         """Say with which settings a grid passes that only leaves out too much: of the mean surface, or without thin limbs; else nothing."""

@@ -8,12 +8,14 @@ import numpy as np
 
 from ..errors import words_of_number
 from ..grid.certificate import Fault, place_of
-from .distances import heights_over
+from .distances import distances_to_grid, heights_over
 from .folds import fold_angles
 from .left_out import points_together
 from .limits import NOISES_OFF, PLACES_KEPT
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from ..grid.grid import Grid
     from ..surface.samples import SurfaceSamples
     from .distances import Distances
@@ -39,6 +41,9 @@ MOST_OFF_MEAN, OFF_MEAN = 0.33, 0.2
 # distance from the grid, beyond the noise, from which on points are of a peak that it cuts off [member lengths], and how many these
 # are at least, in all and times as many as points of a line as long
 PEAK, FEWEST_OF_PEAK, WIDTH_OF_PEAK = 0.3, 12, 3.0
+# distance of a crest from a grid from which on it is cut off, and share of its places that may be nearer [member lengths]
+CREST_OFF, SHARE_OF_CREST = 0.1, 0.6
+CRESTS_MEET_WITHIN = 1.5  # distance of the ends of two crests within which they meet in a corner [member lengths]
 
 
 def unfollowed_parts(
@@ -207,3 +212,19 @@ def _warning(grid: Grid, samples: SurfaceSamples, found: Distances, parts: list[
     )
     at, *others = (place_of(place) for place in samples.scan[worst] + samples.origin)
     return Fault("unfollowed", words, at, tuple(others))
+
+
+def crests_cut_off(grid: Grid, crests: Sequence[np.ndarray], length: float) -> tuple[int, ...]:
+    """Return the numbers of the crests, each places (K, 3), that a grid cuts off, and of those that meet them: a box has all or none.
+
+    length : desired member length [scan unit]
+    """
+    off = [np.quantile(distances_to_grid(places, grid, length)[0], SHARE_OF_CREST) for places in crests]
+    chosen = [number for number in range(len(crests)) if off[number] > CREST_OFF * length]
+    for number in chosen:  # each is added once
+        ends = crests[number][[0, -1]]
+        for other, places in enumerate(crests):
+            gaps = np.linalg.norm(ends[:, None] - places[[0, -1]], axis=2)
+            if other not in chosen and gaps.min() < CRESTS_MEET_WITHIN * length:
+                chosen.append(other)
+    return tuple(sorted(chosen))

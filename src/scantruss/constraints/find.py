@@ -15,7 +15,7 @@ from .fixed_lines import add_polylines
 from .fixed_nodes import check_fixed_positions
 from .network import NO_LINES, Lines, Network
 from .ridge_ends import Ridge
-from .ridges import add_ridges, cut_around, find_ridges, without
+from .ridges import add_ridges, cut_around, find_ridges, fold_lines, without
 from .ridges_at_boundary import with_ridge_ends
 
 if TYPE_CHECKING:
@@ -37,7 +37,11 @@ class Constraints:
 
 
 def find_constraints(
-    samples: SurfaceSamples, boundary: Boundary, settings: Settings, faults: Sequence[Place] = ()
+    samples: SurfaceSamples,
+    boundary: Boundary,
+    settings: Settings,
+    faults: Sequence[Place] = (),
+    wide: tuple[int, ...] = (),
 ) -> tuple[Boundary, Constraints]:
     """Return what the grid must keep: fixed nodes, fixed lines and the ridges of the scan; and the boundary with the ends of lines.
 
@@ -50,6 +54,8 @@ def find_constraints(
         `fixed`, `fixed_lines`, `ridge_angle`, `length`, `corner_angle`.
     faults : places [scan unit], optional
         Where grids failed that followed the ridges: there they are given up.
+    wide : numbers, optional
+        Wide folds that are ridges too, see `ridges.find_ridges`.
 
     Returns
     -------
@@ -64,23 +70,33 @@ def find_constraints(
         leaves the scan.
     """
     positions = check_fixed_positions(settings.fixed, samples, settings.length)
-    ridges = ridges_away_from(faults, samples, settings)
+    ridges = ridges_away_from(faults, samples, settings, wide)
     boundary = with_ridge_ends(boundary, ridges, samples, settings.length)
     lines = find_lines(samples, boundary, ridges, settings)
     ended = tuple(with_line_ends(loop, lines.stops_on(k)) for k, loop in enumerate(boundary.loops))
     return replace(boundary, loops=ended), Constraints(positions, lines)
 
 
-def ridges_away_from(faults: Sequence[Place], samples: SurfaceSamples, settings: Settings) -> list[Ridge]:
+def ridges_away_from(
+    faults: Sequence[Place], samples: SurfaceSamples, settings: Settings, wide: tuple[int, ...] = ()
+) -> list[Ridge]:
     """Return the ridges that the grid is to follow, without what lies near faults, places [scan unit]."""
-    return cut_around(wanted_ridges(samples, settings), np.reshape(faults, (-1, 3)) - samples.origin, settings.length)
+    return cut_around(
+        wanted_ridges(samples, settings, wide), np.reshape(faults, (-1, 3)) - samples.origin, settings.length
+    )
 
 
-def wanted_ridges(samples: SurfaceSamples, settings: Settings) -> list[Ridge]:
+def wanted_ridges(samples: SurfaceSamples, settings: Settings, wide: tuple[int, ...] = ()) -> list[Ridge]:
     """Return the ridges that the grid is to follow; see `ridges.find_ridges`."""
     wanted = settings.ridge_angle > 0.0 and settings.method == "default" and not samples.smooth
-    ridges = [ridge for ridge in find_ridges(samples, settings) if _on_pieces(ridge, samples)] if wanted else []
+    ridges = [ridge for ridge in find_ridges(samples, settings, wide) if _on_pieces(ridge, samples)] if wanted else []
     return without(ridges, [np.array(place, float) - samples.origin for place in settings.no_ridge_at], settings.length)
+
+
+def wide_folds(samples: SurfaceSamples, settings: Settings) -> list[np.ndarray]:
+    """Return the places (K, 3) along each line of folds that turn over nearly a member; none where no ridges are wanted."""
+    wanted = settings.ridge_angle > 0.0 and settings.method == "default" and not samples.smooth
+    return [folds["place"] for folds in fold_lines(samples, settings).wide] if wanted else []
 
 
 def _on_pieces(ridge: Ridge, samples: SurfaceSamples) -> bool:

@@ -11,6 +11,7 @@ from ..kernels.mesh.point_location import nearest_sample
 from ..kernels.surface import ridges as kernels
 from ..kernels.surface.local_surface import walk
 from ..kernels.surface.ridges import FOLD
+from ..kernels.surface.wide_folds import fit_wide_fold
 from ..runtime.jit import new_record
 from ..runtime.watch import Watch
 from ..surface.samples import distance_from_scan
@@ -27,15 +28,24 @@ POINTS_OF_A_FIT = 300.0  # points to which a fold is fitted, some more or less
 MOST_POINTS_OF_FIT = 6000  # points that there is room for
 FEWEST_OF_A_SAMPLE = 3.0  # of each sample at least
 FOLD_FITS_WITHIN = 0.02  # distance of the points from a fold up to which no smaller radius is tried [member lengths]
+FOLD_AHEAD, WIDE_FOLD_AHEAD = 0.6, 1.0  # farthest that the next crest lies from where it was expected [steps]
 FOLD_STRIDE = 0.25  # step from place to place along a fold [member lengths]
 LEAST_TURN_SHARE = 0.25  # share of the ridge angle by which neighbouring normals must differ where a fold is looked for
 LIKELY_FOLD = 0.35  # share of the ridge angle above which a fold is looked at more closely
 WEAK_FOLD = 0.6  # share of the ridge angle from which a fold is followed
 SHARP_SHARE = 1.5  # share of it from which no larger radius is tried
+NEARLY_FULL_ANGLE = 0.9  # share of the ridge angle that counts as full: noise takes some away
+LEAST_FULL_SHARE = 0.55  # least share of a ridge that has the full angle, unless that part is long enough
+LONG_FULL = 2.5  # length of a ridge with the full angle that is enough, whatever its share [member lengths]
+GAIN_OF_FILLET = 90.0  # median gain of a line of wide folds, at least
 FADED_FOLD = 0.2  # a fold ends where its angle has fallen to this share of the ridge angle
 FOLD_OVER_SMOOTH = 10.0  # how much better a fold must fit than a smooth surface (F statistic)
 ROUGHEST_SIDE = 0.12  # points farther from a fold than this follow neither side [member lengths]
 LOOK_SPACING = 0.33  # places closer together than this are not looked at twice [member lengths]
+FOLD_BESIDE, WIDE_FOLD_BESIDE = (
+    0.5,
+    0.8,
+)  # farthest that the crest lies from the place at which a fold was found [member lengths]
 MOST_SAMPLES = 4000  # most samples from which folds are looked for, the sharpest first
 FALSE_FOLDS_OF_ROUGH = 12  # places in a row that look folded and are no ridge, after which only long ridges count
 MOST_FALSE_FOLDS = 80  # such places in a row after which the search stops
@@ -71,6 +81,7 @@ class Tracer:
         self.fits = max(FOLD_FITS_WITHIN * settings.length, 1.5 * float(np.median(samples.thickness)))
         self.buffer = np.empty(MOST_POINTS_OF_FIT, FIT_POINT)
         self.origin = samples.origin
+        self.wide = False
         self.watch = Watch(
             TANGLED_RIDGES, samples.area / (FOLDS_MEET_WITHIN * FOLD_STRIDE * settings.length**2), MOST_TRACED
         )
@@ -83,6 +94,12 @@ class Tracer:
         fold, best = new_record(FOLD), None
         x, y, z = place.tolist()
         a, b, c = towards.tolist()
+        if (
+            self.wide
+            and fit_wide_fold(self.surface, sample, (x, y, z), (a, b, c), fold)
+            and fold.gain >= FOLD_OVER_SMOOTH
+        ):
+            return fold
         for number, (radius, most) in enumerate(zip(self.radii, self.most, strict=True)):
             if number < first or (number >= FIRST_NEAR_CORNERS and best is not None and self._is_clear(best)):
                 continue
@@ -107,10 +124,25 @@ class Tracer:
 
     def trace(self) -> list[np.ndarray]:
         """The folds (K,) FOLD, a stride apart along each line of folds that is long and sharp enough to be a ridge."""
+        return self._trace_from(self._seeds(), [])
+
+    def trace_wide(self, narrow: list[np.ndarray]) -> list[np.ndarray]:
+        """The same of folds that turn over nearly a member, away from the sharp ones of the lines that are known."""
+        sharp = [folds for folds in narrow if is_sharp(folds, self.angle)]
         seeds = self._seeds()
+        places, away = self.surface.mean[seeds], np.ones(len(seeds), bool)
+        for folds in sharp:
+            away &= squares_between(places, folds).min(axis=1) > self.length**2
+        self.wide = True
+        found = self._trace_from(seeds[away], sharp)[len(sharp) :]
+        self.wide = False
+        return [folds for folds in found if is_made(folds, self.angle)]
+
+    def _trace_from(self, seeds: np.ndarray, known: list[np.ndarray]) -> list[np.ndarray]:
+        """The lines of folds that are known, and those around samples (K,) that belong to none of them."""
         fresh = np.ones(len(seeds), bool)
         places = self.surface.mean[seeds]
-        ridges: list[np.ndarray] = []
+        ridges = list(known)
         misses, rough = 0, False
         for k, sample in enumerate(seeds.tolist()):
             if not fresh[k]:
@@ -123,11 +155,14 @@ class Tracer:
             if (
                 fold is not None
                 and fold.bend > WEAK_FOLD * self.angle
-                and np.linalg.norm(fold.place - places[k]) < 0.5 * self.length
+                and np.linalg.norm(fold.place - places[k])
+                < (WIDE_FOLD_BESIDE if self.wide else FOLD_BESIDE) * self.length
             ):
                 folds = self._follow(sample, fold, [ridge["place"] for ridge in ridges])
                 self.watch.note(len(folds), folds["place"][-1] + self.origin)
-                even = [part for part in parts_of_fold(folds) if is_even(part, WEAK_FOLD * self.angle, self.sharpest)]
+                slack = WIDE_UNEVEN if self.wide else 0.0
+                parts = parts_of_fold(folds)
+                even = [part for part in parts if is_even(part, WEAK_FOLD * self.angle, self.sharpest, slack)]
                 even = [part for part in even if not rough or is_clear_on_rough(part, self.angle)]
                 ridges += even
                 misses = 0 if even else misses
@@ -143,7 +178,7 @@ class Tracer:
             fold = self.fold_at(nearest_sample(self.surface, *place.tolist()), place, ahead, len(self.radii) - 1)
             if fold is None or fold.bend < WEAK_FOLD * self.angle or abs(fold.ahead @ ahead) < LEAST_TURN_COSINE:
                 return False
-            if np.linalg.norm(fold.place - place) > 0.6 * FOLD_STRIDE * self.length:
+            if np.linalg.norm(fold.place - place) > FOLD_AHEAD * FOLD_STRIDE * self.length:
                 return False
         return True
 
@@ -222,7 +257,8 @@ class Tracer:
         """Whether the fold found where a line of folds should go on belongs to it."""
         return bool(
             fold.bend >= FADED_FOLD * self.angle
-            and np.linalg.norm(fold.place - place) < 0.6 * FOLD_STRIDE * self.length
+            and np.linalg.norm(fold.place - place)
+            < (WIDE_FOLD_AHEAD if self.wide else FOLD_AHEAD) * FOLD_STRIDE * self.length
             and abs(fold.ahead @ ahead) > LEAST_TURN_COSINE
         )
 
@@ -250,6 +286,32 @@ class Tracer:
         return moved
 
 
+def squares_between(places: np.ndarray, folds: np.ndarray) -> np.ndarray:
+    """Squared distances (M, K) of places (M, 3) from those of folds (K,) FOLD."""
+    squares: np.ndarray = ((places[:, None] - folds["place"]) ** 2).sum(axis=2)
+    return squares
+
+
+def runs_along(folds: np.ndarray, others: list[np.ndarray], length: float) -> bool:
+    """Whether most of a line of folds (K,) FOLD lies within a length of others."""
+    if not others:
+        return False
+    nearest = np.min([squares_between(folds["place"], other).min(axis=1) for other in others], axis=0)
+    return bool((nearest < length**2).mean() > 0.5)
+
+
+def is_made(folds: np.ndarray, angle: float) -> bool:
+    """Whether a line of wide folds (K,) FOLD turns by the ridge angle, between sides so even that it is a fillet."""
+    return bool(np.median(folds["bend"]) >= angle and np.median(folds["gain"]) >= GAIN_OF_FILLET)
+
+
+def is_sharp(folds: np.ndarray, angle: float) -> bool:
+    """Whether a line of folds (K,) FOLD has the full angle along enough of it."""
+    full = folds["bend"] >= NEARLY_FULL_ANGLE * angle
+    size = float(full.sum()) * FOLD_STRIDE
+    return bool(size >= LONG_FULL or (size >= LEAST_FULL_LENGTH and full.mean() >= LEAST_FULL_SHARE))
+
+
 PLACES_OF_TURN = 3  # places on both sides from which the turn of a line is taken
 CORNER_TURN = 25.0  # by how much a line turns more in a corner than before and after it [degree]
 SHORTEST_LINE_OF_FOLDS = 1.0  # least length of a line of folds [member lengths]
@@ -261,6 +323,7 @@ SHARPEST_EDGE = 155.0  # most that a surface bends at a fold where sharp edges o
 EVEN_FOLDS = (0.5, 3.5)
 BLUNT_FOLD, ACUTE_FOLD = 50.0, 70.0  # angles of folds between which the allowed change of the bend grows [degree]
 BY_NOISE = 0.2  # change of the bend that noise explains, for the root of the gain 1 [radian]
+WIDE_UNEVEN = 2.0  # further change of the bend that is allowed of wide folds, whose places are less certain [degree]
 SURE_GAIN = 25.0  # median gain, at least (F statistic)
 
 
@@ -292,7 +355,7 @@ def is_clear_on_rough(folds: np.ndarray, angle: float) -> bool:
     return len(folds) * FOLD_STRIDE >= LEAST_ROUGH_RIDGE and float(np.median(folds["bend"])) >= ROUGH_SHARE * angle
 
 
-def is_even(folds: np.ndarray, angle: float, sharpest: float = SHARPEST_FOLD_ANGLE) -> bool:
+def is_even(folds: np.ndarray, angle: float, sharpest: float = SHARPEST_FOLD_ANGLE, slack: float = 0.0) -> bool:
     """Whether a line of folds (K,) FOLD, a stride apart, has an angle and is as even as a ridge: what bends evenly is."""
     angles = folds["bend"]
     if len(folds) * FOLD_STRIDE < SHORTEST_LINE_OF_FOLDS or (angles >= angle).sum() * FOLD_STRIDE < LEAST_FULL_LENGTH:
@@ -302,7 +365,9 @@ def is_even(folds: np.ndarray, angle: float, sharpest: float = SHARPEST_FOLD_ANG
     bends = np.cross(ahead[1:], ahead[:-1])
     uneven = float(np.median(np.linalg.norm(np.diff(bends, axis=0), axis=1))) if len(bends) > 1 else 0.0
     gain, bend = float(np.median(folds["gain"])), np.degrees(float(np.median(angles)))
-    most = np.radians(np.interp(bend, (BLUNT_FOLD, ACUTE_FOLD), EVEN_FOLDS)) + BY_NOISE / np.sqrt(max(gain, 1.0))
+    most = np.radians(np.interp(bend, (BLUNT_FOLD, ACUTE_FOLD), EVEN_FOLDS) + slack) + BY_NOISE / np.sqrt(
+        max(gain, 1.0)
+    )
     return bool(gain >= SURE_GAIN and uneven <= most and bend < sharpest)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import weakref
 from collections.abc import Sequence
+from functools import cached_property
 from itertools import combinations
 from typing import TYPE_CHECKING
 
@@ -11,7 +12,7 @@ import numpy as np
 
 from ..boundary.polylines import divide_polyline
 from .fixed_lines import LINE_STEP
-from .fold_tracing import FOLD_STRIDE, LEAST_FULL_LENGTH, Tracer
+from .fold_tracing import FOLD_STRIDE, Tracer, is_sharp, runs_along
 from .network import Network, runs
 from .ridge_ends import Ridge, join_ends
 
@@ -20,9 +21,6 @@ if TYPE_CHECKING:
     from ..surface.samples import SurfaceSamples
 
 END_BESIDE_RIDGE = 0.35  # a weaker ridge whose end is so near to a ridge belongs to it [member lengths]
-NEARLY_FULL_ANGLE = 0.9  # share of the ridge angle that counts as full: noise takes some away
-LEAST_FULL_SHARE = 0.55  # least share of a ridge that has the full angle, unless that part is long enough
-LONG_FULL = 2.5  # length of a ridge with the full angle that is enough, whatever its share [member lengths]
 FAULT_REACH = 1.8  # distance from a fault within which ridges are given up [member lengths]
 LEAST_REMAINDER = 2.0  # least length of what is left of such a ridge [member lengths]
 AT_RIDGE = 0.75  # farthest that a ridge passes a place that names it [member lengths]
@@ -30,27 +28,66 @@ LONGEST_BETWEEN_CORNERS = 1.8  # longest ridge that is looked for between two co
 SHORTEST_RIDGE = 0.35  # shortest such ridge [member lengths]
 
 
-_KEPT: weakref.WeakKeyDictionary[SurfaceSamples, tuple[Settings, tuple[Ridge, ...]]] = weakref.WeakKeyDictionary()
+class FoldLines:
+    """The lines of folds of a scan."""
+
+    def __init__(self, samples: SurfaceSamples, settings: Settings) -> None:
+        self.asked = _asked(settings)
+        self.length = settings.length
+        self._tracer = Tracer(samples, settings)
+        self.narrow = self._tracer.trace()  #: each (K,) FOLD, folded within less than a member
+        self._ridges: dict[tuple[int, ...], tuple[Ridge, ...]] = {}
+
+    @cached_property
+    def wide(self) -> list[np.ndarray]:
+        """Those that turn over nearly a member, each (K,) FOLD."""
+        return self._tracer.trace_wide(self.narrow)
+
+    def ridges(self, numbers: tuple[int, ...]) -> tuple[Ridge, ...]:
+        """The ridges along the narrow lines and along some of the wide ones; see `find_ridges`."""
+        if numbers not in self._ridges:
+            self._ridges[numbers] = self._joined([self.wide[number] for number in numbers])
+        return self._ridges[numbers]
+
+    def _joined(self, wide: list[np.ndarray]) -> tuple[Ridge, ...]:
+        tracer, length = self._tracer, self.length
+        sharp = [folds for folds in self.narrow if is_sharp(folds, tracer.angle)]
+        weak = [
+            folds for folds in self.narrow if not is_sharp(folds, tracer.angle)
+        ]  # pieces of a wide fold look like those
+        traced = (
+            self.narrow if not wide else sharp + [folds for folds in weak if not runs_along(folds, wide, length)] + wide
+        )
+        lines = [Ridge(folds["place"], is_sharp(folds, tracer.angle)) for folds in traced]
+        ridges = kept_ridges(join_ends(lines, length), length)
+        ridges = [ridge.moved(tracer.onto_scan(ridge.places)) for ridge in ridges + short_ridges(ridges, tracer)]
+        return tuple(sorted(ridges, key=lambda ridge: (ridge.ring, -len(ridge.places))))
 
 
-def find_ridges(samples: SurfaceSamples, settings: Settings) -> list[Ridge]:
+_KEPT: weakref.WeakKeyDictionary[SurfaceSamples, FoldLines] = weakref.WeakKeyDictionary()
+
+
+def fold_lines(samples: SurfaceSamples, settings: Settings) -> FoldLines:
+    """Return the lines of folds of a scan; the last are cached for as long as the samples exist."""
+    kept = _KEPT.get(samples)
+    if kept is None or kept.asked != _asked(settings):
+        kept = _KEPT[samples] = FoldLines(samples, settings)
+    return kept
+
+
+def _asked(settings: Settings) -> tuple[float, float, bool]:
+    """What of the settings the lines of folds depend on."""
+    return settings.length, settings.ridge_angle, settings.sharp_edges
+
+
+def find_ridges(samples: SurfaceSamples, settings: Settings, wide: tuple[int, ...] = ()) -> list[Ridge]:
     """Return the ridges of a scan, open ones first, the longest first.
 
     A ridge turns by `ridge_angle` within a member. Weaker ones count where they come to one: a roof has all of its hips or none.
-    The last result is cached for as long as the samples exist.
+
+    wide : numbers of those of `FoldLines.wide` that are ridges too
     """
-    kept = _KEPT.get(samples)
-    if kept is None or kept[0] != settings:
-        kept = _KEPT[samples] = (settings, _find_ridges(samples, settings))
-    return list(kept[1])
-
-
-def _find_ridges(samples: SurfaceSamples, settings: Settings) -> tuple[Ridge, ...]:
-    tracer = Tracer(samples, settings)
-    traced = [Ridge(folds["place"], _is_sharp(folds, tracer.angle)) for folds in tracer.trace()]
-    ridges = kept_ridges(join_ends(traced, settings.length), settings.length)
-    ridges = [ridge.moved(tracer.onto_scan(ridge.places)) for ridge in ridges + short_ridges(ridges, tracer)]
-    return tuple(sorted(ridges, key=lambda ridge: (ridge.ring, -len(ridge.places))))
+    return list(fold_lines(samples, settings).ridges(wide))
 
 
 def add_ridges(network: Network, ridges: list[Ridge]) -> None:
@@ -118,10 +155,3 @@ def short_ridges(ridges: list[Ridge], tracer: Tracer) -> list[Ridge]:
                 steps = max(int(np.linalg.norm(last - first) / (FOLD_STRIDE * length)), 1) + 1
                 found.append(Ridge(np.linspace(first, last, steps), True))
     return found
-
-
-def _is_sharp(folds: np.ndarray, angle: float) -> bool:
-    """Whether a line of folds (K,) has the full angle along enough of it."""
-    full = folds["bend"] >= NEARLY_FULL_ANGLE * angle
-    size = float(full.sum()) * FOLD_STRIDE
-    return bool(size >= LONG_FULL or (size >= LEAST_FULL_LENGTH and full.mean() >= LEAST_FULL_SHARE))

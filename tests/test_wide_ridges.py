@@ -1,0 +1,102 @@
+"""Ridges along folds that turn over nearly a member: found by the normals of both sides, kept where the grid follows better."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from marks import compiled_only
+
+from scantruss import Grid, PointCloud, Settings, grid_from_points
+from scantruss.attempts.looks import follows_better
+from scantruss.attempts.table import Attempt
+from scantruss.boundary.find import find_boundary
+from scantruss.check.unfollowed import crests_cut_off
+from scantruss.constraints.find import wide_folds
+from scantruss.constraints.ridges import find_ridges, fold_lines
+from scantruss.grid.certificate import Fault
+from scantruss.pipeline import make_grid
+from scantruss.surface.samples import sample_surface
+
+SIZE, HALF = 5.0, 20.0  # member length, half the side of the box
+ALL_TWELVE = 12
+
+
+def rounded_box(radius: float, count: int = 60_000, noise: float = 0.02) -> np.ndarray:
+    """Points (N, 3) on a cube whose edges are rounded by a radius."""
+    rng = np.random.default_rng(5)
+    places = rng.uniform(-HALF, HALF, (count, 3))
+    places[np.arange(count), rng.integers(0, 3, count)] = HALF * rng.choice([-1.0, 1.0], count)
+    inner = np.clip(places, radius - HALF, HALF - radius)
+    outward = (places - inner) / np.linalg.norm(places - inner, axis=1)[:, None]
+    return inner + (radius + noise * rng.normal(size=(count, 1))) * outward
+
+
+@pytest.fixture(scope="module")
+def cloud() -> PointCloud:
+    return PointCloud.from_array(rounded_box(0.57 * SIZE))
+
+
+@compiled_only
+def test_wide_fillets_have_their_crests(cloud: PointCloud) -> None:
+    """They turn by 90 degrees over nine tenths of a member; the whole cube has twelve edges."""
+    settings, radius = Settings(length=SIZE), 0.57 * SIZE
+    samples = sample_surface(cloud, settings)
+    lines = fold_lines(samples, settings)
+    ridges = find_ridges(samples, settings, tuple(range(len(lines.wide))))
+    assert len(ridges) == ALL_TWELVE
+    crest = HALF - radius * (1.0 - np.sqrt(0.5))
+    for ridge in ridges:
+        places = np.abs(ridge.places + cloud.origin)
+        beside = np.sort(places, axis=1)[:, 1:]
+        inner = places.min(axis=1) < HALF - 5.0
+        assert np.abs(beside[inner] - crest).max() < 0.15 * SIZE
+
+
+@compiled_only
+def test_a_box_has_all_of_its_wide_edges_or_none(cloud: PointCloud) -> None:
+    """Where a grid cuts off one of them, those that meet it are ridges too, and those that meet these."""
+    settings = Settings(length=SIZE)
+    samples, _ = find_boundary(sample_surface(cloud, settings), settings)
+    plain = make_grid(cloud, Attempt(settings))
+    crests = wide_folds(samples, settings)
+    assert crests_cut_off(plain, crests, SIZE) in ((), tuple(range(len(crests))))
+    assert wide_folds(samples, settings.replace(ridge_angle=0.0)) == []
+
+
+@compiled_only
+def test_a_grid_with_wide_ridges_is_nearer_to_the_scan(cloud: PointCloud) -> None:
+    settings = Settings(length=SIZE)
+    plain, made = make_grid(cloud, Attempt(settings)), grid_from_points(cloud, settings)
+    assert made.certificate is not None and made.certificate.passed
+    assert made == plain or follows_better(made, plain)
+    assert not follows_better(plain, made)
+
+
+@compiled_only
+def test_more_effort_does_not_leave_the_wide_ridges(cloud: PointCloud) -> None:
+    normal, best = (grid_from_points(cloud, Settings(length=SIZE, effort=effort)) for effort in ("normal", "best"))
+    assert (len(normal.lines) > 0) == (len(best.lines) > 0)
+
+
+def _with(grid: Grid, p99: float, kinds: tuple[str, ...] = ()) -> Grid:
+    assert grid.certificate is not None and grid.certificate.scan_distance is not None
+    spread = replace(grid.certificate.scan_distance, p99=p99)
+    warnings = tuple(Fault(kind, "", None) for kind in kinds)
+    return grid.replace(certificate=replace(grid.certificate, scan_distance=spread, warnings=warnings))
+
+
+def test_nearer_counts_against_poorer_and_unevener() -> None:
+    rng = np.random.default_rng(2)
+    flat = np.column_stack([rng.uniform(0.0, 40.0, (6_000, 2)), 0.02 * rng.normal(size=6_000)])
+    grid = grid_from_points(flat, Settings(length=SIZE))
+    near, far = _with(grid, 0.1 * SIZE), _with(grid, 0.2 * SIZE)
+    assert follows_better(near, far) and not follows_better(far, near) and not follows_better(near, near)
+    assert not follows_better(_with(grid, 0.1 * SIZE, ("angle",)), far)
+    assert follows_better(_with(grid, 0.1 * SIZE, ("gap",)), far)
+    longer = grid.nodes.copy()
+    longer[::2, 0] *= 1.3  # members far less even
+    uneven = near.replace(nodes=longer)
+    assert not follows_better(uneven, far)
+    assert not follows_better(grid.replace(certificate=None), far)
