@@ -143,8 +143,9 @@ def places_to_look_at(found: Certificate, missed_at: Place, rounded: float = 0.0
         for part in found.left_out
         if part.kind == "far" and part.where is not None and part.farthest is not None
     ]
-    farther = sum(part.share for part in found.left_out if part.kind in SAID_ALONE)
-    if (nearer := found.missing - farther) > WARN_LEFT_OUT:
+    alone = [part for part in found.left_out if part.kind in SAID_ALONE]
+    if (nearer := found.missing - sum(part.share for part in alone)) > WARN_LEFT_OUT:
+        farther = any(part.kind == "far" for part in alone)
         words = f"misses {nearer:.1%} of the points by {'half a member to a member' if farther else 'more than half a member'}"
         warnings.append(Fault("missed", words, missed_at))
     if WARN_LEFT_OUT < rounded <= MOST_ROUNDED:
