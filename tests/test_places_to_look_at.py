@@ -12,7 +12,7 @@ from typed import known
 
 import scantruss as st
 from scantruss.boundary.find import Boundary, Loop
-from scantruss.check.boundaries import boundary_beyond, places_aside, stops_short
+from scantruss.check.boundaries import boundary_beyond, boundary_left, places_aside, stops_short
 from scantruss.check.certify import certify, passed_grid
 from scantruss.check.distances import measure_distances
 from scantruss.check.doubtful import doubtful_places, zigzags
@@ -359,6 +359,21 @@ def test_what_is_listed_as_left_out_is_not_warned_of_twice() -> None:
     more = replace(limb, missing=0.041)
     missed = places_to_look_at(more, (0.0, 0.0, 0.0))[0]
     assert missed.words == "misses 1.2% of the points by more than half a member"
+
+
+def test_a_grid_that_leaves_the_boundary_all_along_is_a_fault() -> None:
+    """As where its edge runs to and fro over a rounded lip; a few places are a warning."""
+    grid = lattice()
+    boundary = bounded(grid)
+    assert not boundary_left(grid, boundary, 1.0)
+    (around,) = grid.boundary_loops
+    for count in (len(around), 8):
+        nodes = grid.nodes.copy()
+        nodes[around[:count:2], 2] += 0.4
+        found = boundary_left(grid.replace(nodes=nodes), boundary, 1.0)
+        assert bool(places_aside(grid.replace(nodes=nodes), boundary, 1.0))
+        assert [fault.kind for fault in found] == (["beyond"] if count == len(around) else [])
+        assert all(f"of its {len(around)} members, by up to 0.4" in fault.words for fault in found)
 
 
 def test_a_corner_that_is_cut_off_is_a_warning_with_its_place() -> None:

@@ -16,7 +16,7 @@ from ..grid.certificate import Certificate, Fault, Spread, Worst, place_of
 from ..runtime.parallel import side_by_side
 from ..surface.chosen_samples import KEPT, LIMB, SLIT
 from .bare import mostly_bare
-from .boundaries import boundary_beyond, places_aside, stops_short
+from .boundaries import places_aside, stops_short
 from .crossings import find_crossings
 from .defects import faults_in_space, faults_of_topology, fixed_off_scan
 from .distances import Distances, measure_distances, offsets_from_points
@@ -27,7 +27,7 @@ from .hanging import hanging_nodes, nodes_off_sheets
 from .irregular import count_irregular
 from .left_out import asked_for, closed_holes, first_and_more, parts_left_out
 from .limits import NOISES_OFF, ROUNDED_BY, limits_of, mostly_rounded, places_to_look_at, widened_limits
-from .openings import boundary_overrun
+from .openings import boundary_faults
 from .sheets import cut_apart, faults_on_sheets, nodes_of_samples
 from .slits import feet_on, narrow_gaps
 from .sparse import sparse_parts
@@ -107,7 +107,7 @@ class Judged:
             lambda: bridged_gaps(grid, samples, boundary, length),
             lambda: [] if settings.boundary else doubtful_places(grid, samples, length),
             lambda: _at_boundary(grid, samples, boundary, found, followed, members, length),
-            lambda: boundary_beyond(grid, samples, boundary, length) or boundary_overrun(grid, boundary, length),
+            lambda: boundary_faults(grid, samples, boundary, length),
             lambda: [] if rough else _beside(grid, samples, found, followed, members),
             lambda: cut_apart(grid, samples, found, length),
             lambda: mostly_bare(grid, samples, feet, length),

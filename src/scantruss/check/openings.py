@@ -10,13 +10,14 @@ from ..constraints.network import curves_of
 from ..grid.certificate import Fault, place_of
 from ..kernels.boundary.curves import distances_from_curves
 from ..scan.formats.choose import in_polygon
-from .boundaries import COVERED_WITHIN
+from .boundaries import COVERED_WITHIN, boundary_beyond, boundary_left
 from .distances import distances_to_grid
 from .limits import HEXAGON_BOUNDARY
 
 if TYPE_CHECKING:
     from ..boundary.find import Boundary, Loop
     from ..grid.grid import Grid
+    from ..surface.samples import SurfaceSamples
 
 # distance of the boundary of the scan from that of the grid above which the grid has left it, and over how much of it that is a fault
 # where the grid covers it: of 190 grids of shells, twins and real scans one, of a quarry, leaves it so far, over 0.94 [member lengths]
@@ -27,6 +28,12 @@ FLAT_OPENING = 0.25  # distance of its edge from its mean plane up to which that
 LARGEST_OPENING = 25.0  # length around an opening up to which it may be bridged by a grid that passes [member lengths]
 AT_OPENING = 0.5  # distance from that plane within which a triangle may lie over it [member lengths]
 ALONG_SIDE = 8  # places along a side of a triangle that are looked at
+
+
+def boundary_faults(grid: Grid, samples: SurfaceSamples, boundary: Boundary, length: float) -> list[Fault]:
+    """Return the fault of a grid that does not keep to the boundary of its scan, the gravest of these; parameters as of the others."""
+    beyond = boundary_beyond(grid, samples, boundary, length) or boundary_overrun(grid, boundary, length)
+    return beyond or boundary_left(grid, boundary, length)
 
 
 def boundary_overrun(grid: Grid, boundary: Boundary, length: float) -> list[Fault]:
