@@ -583,8 +583,9 @@ def test_pieces_that_are_too_small_are_counted(place: Path, capsys: pytest.Captu
     patch = 0.1 * plate() + np.array([200.0, 0.0, 0.0])
     np.savetxt("scan.xyz", np.concatenate([plate(), patch]))
     assert main(["grid", "scan.xyz", "a.obj", "--length", LENGTH]) == 0
-    said = capsys.readouterr().err
-    assert "1 piece, " in said and " % of the scanned surface, left out" in said
+    said = capsys.readouterr().out
+    assert said.startswith("50.0% of the scan, 8,000 of 16,000 points, is not in the grid: in pieces too small")
+    assert "left out: 8,000 points (50.00%) in pieces too small for this length, near (20" in said
 
 
 def test_info_says_what_a_length_can_be(place: Path, capsys: pytest.CaptureFixture[str]) -> None:

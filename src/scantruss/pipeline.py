@@ -166,15 +166,21 @@ def make_grid_with_wide_ridges(cloud: PointCloud, attempt: Attempt, *, progress:
     if not crests:
         return make_grid(cloud, attempt, progress=progress)
     is_long = attempt.settings.effort == "best"
+    seen = _unseen(progress) if is_long else progress
     first = replace(attempt, settings=attempt.settings.replace(effort="normal")) if is_long else attempt
-    plain = make_grid(cloud, first, progress=progress)
+    plain = make_grid(cloud, first, progress=seen)
     wide = crests_cut_off(plain, crests, settings.length)
     if wide:
         with suppress(FrontError):
-            folded = make_grid(cloud, replace(first, wide=wide), progress=progress)
+            folded = make_grid(cloud, replace(first, wide=wide), progress=seen)
             if follows_better(folded, plain):
                 return make_grid(cloud, replace(attempt, wide=wide), progress=progress) if is_long else folded
     return make_grid(cloud, attempt, progress=progress) if is_long else plain
+
+
+def _unseen(progress: Progress | None) -> Progress | None:
+    """Return a progress of work that only comes before: it can be stopped, and shows that it goes on, but not how far."""
+    return None if progress is None else lambda stage, share: progress("front", 0.0)
 
 
 def first_that_passes(
