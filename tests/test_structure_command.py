@@ -252,6 +252,7 @@ def test_what_is_odd_in_what_was_given_is_said(place: Path, capsys: pytest.Captu
     assert "warning: 49 of 49 nodes are supported; heights of supports are in metres" in said
     assert 'force = [0, 0, -2] has no unit and is taken in N; write it as "-2N"' in said
     assert "have none of SLS" in said and "supports: 49 nodes, 0 to " in said
+    assert "m above the lowest node, nodes up to 50 m above the lowest" in said
     assert (
         run("structure grid.json out.json --scale 50 --supports corners --loads self,cladding:90kN/m2 --buckling 1")
         == 0

@@ -214,7 +214,8 @@ def note_pieces(bars: Bars, cloud: PointCloud, settings: Settings) -> None:
         crop = "" if (in_box.all(axis=1) & of_others).any() else f", --crop box:{box} all in its box"
         bars.note(f"piece {number}: {size}{unit}; {option} {number} takes it alone{crop}")
     if len(large) > MOST_PIECES:
-        bars.note(f"and {len(large) - MOST_PIECES} smaller pieces")
+        more = len(large) - MOST_PIECES
+        bars.note(f"and {more} smaller piece{'s' if more > 1 else ''}")
 
 
 @contextmanager

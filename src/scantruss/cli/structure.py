@@ -146,7 +146,7 @@ def structure(values: Namespace) -> None:
             save.json(report_place, report.to_dict() | {"warnings_of_grid": of_grid})
         if plot is not None and report.path is not None:
             save.beside(plot).write_bytes(encode_path(report.path))
-    _print_report(report, of_grid, [*written, *(place for place in (report_place, plot) if place)])
+    _print_report(report, settings.supports, of_grid, [*written, *(place for place in (report_place, plot) if place)])
 
 
 def _solved(
@@ -180,8 +180,9 @@ def _solved(
     return solution, report_structure(solution, settings.checks, doubts_of_settings(settings, grid), **found)
 
 
-def _print_report(report: StructureReport, of_grid: Sequence[str], wrote: Sequence[Path]) -> None:
-    """Print the table of a structure, its lines, its warnings and the files that were written."""
+def _print_report(report: StructureReport, supports: str, of_grid: Sequence[str], wrote: Sequence[Path]) -> None:
+    """Print the table of a structure, its lines, its warnings and the files that were written; supports: as asked for."""
+    from ..report.structural.words import supports_in_words
     from ..report.terminal import print_lines, print_table
     from ..structure.doubts import support_words
     from ..structure.report_lines import (
@@ -207,7 +208,7 @@ def _print_report(report: StructureReport, of_grid: Sequence[str], wrote: Sequen
             f"{len(truss.nodes):,} nodes, {len(truss.members):,} members of {names} {truss.material.name},"
             f" {truss.lengths.mean():.3g} m long on average, {truss.mass:,.0f} kg without nodes",
             *node_lines(truss),
-            support_words(truss),
+            f"{support_words(truss)}{f', {supports_in_words(supports)}' if supports else ''}",
             *sizing_lines(report),
             *mode_lines(report),
             *(
