@@ -18,7 +18,7 @@ from typed import known
 import scantruss as st
 from scantruss import candidates, pipeline
 from scantruss.attempts.limit import MOST_RUNS, AttemptLimit
-from scantruss.attempts.table import FRONT_LENGTHS, SMOOTHED, Attempt, attempts
+from scantruss.attempts.table import FRONT_LENGTHS, SMOOTHING_SCALES, Attempt, attempts
 from scantruss.check.certify import Judged, judge
 from scantruss.errors import CertificateError, FrontError
 from scantruss.improve.optimize import improve_last
@@ -71,8 +71,8 @@ def test_the_mean_surface_is_tried_on_rough_scans_alone_and_on_very_rough_ones_a
     points[:, 2] += np.random.default_rng(0).normal(0.0, noise, len(points))
     cloud = st.PointCloud.from_array(points)
     scales = [attempt.settings.smooth_scale for attempt in attempts(cloud, st.Settings(length=1.0))]
-    assert (scales.index(SMOOTHED[0]) if SMOOTHED[0] in scales else None) == first
-    assert [scale for scale in scales if scale] == [scale for scale in SMOOTHED for _ in range(2) if first]
+    assert (scales.index(SMOOTHING_SCALES[0]) if SMOOTHING_SCALES[0] in scales else None) == first
+    assert [scale for scale in scales if scale] == [scale for scale in SMOOTHING_SCALES for _ in range(2) if first]
     for asked in (0.0, 0.7):
         made = attempts(cloud, st.Settings(length=1.0, smooth_scale=asked))
         assert {attempt.settings.smooth_scale for attempt in made} == {asked}

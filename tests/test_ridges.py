@@ -23,7 +23,7 @@ from scantruss.errors import FrontError
 from scantruss.kernels.geometry.quadric import FIT_POINT
 from scantruss.kernels.surface.ridges import (
     FOLD,
-    TERMS,
+    TERMS_OF_FOLD,
     fit_fold,
     fold_error,
     turned_frame,
@@ -289,7 +289,7 @@ def test_the_error_of_a_fold_is_that_of_least_squares(seed: int, folded: bool) -
     shift = rng.uniform(-0.3, 0.3)
     frame = turned_frame((1.0, 0.0, 0.0), (0.0, 0.0, 1.0), rng.uniform(-0.3, 0.3))
     c, e, n = map(np.array, frame)
-    matrix = np.empty((TERMS, TERMS + 1))
+    matrix = np.empty((TERMS_OF_FOLD, TERMS_OF_FOLD + 1))
     error = fold_error(buffer, 60, frame, shift, 1.0, folded, rounding, matrix)
     u, t, h = buffer["place"] @ c - shift, buffer["place"] @ e, buffer["place"] @ n
     size = np.hypot(u, rounding)
@@ -298,7 +298,7 @@ def test_the_error_of_a_fold_is_that_of_least_squares(seed: int, folded: bool) -
     root = np.sqrt(buffer["weight"])
     solution, squares, *_ = np.linalg.lstsq(root[:, None] * terms, root * h, rcond=None)
     assert error == pytest.approx(float(squares[0]), rel=1e-4)
-    assert np.allclose(matrix[: terms.shape[1], TERMS], solution, rtol=1e-3, atol=1e-3)
+    assert np.allclose(matrix[: terms.shape[1], TERMS_OF_FOLD], solution, rtol=1e-3, atol=1e-3)
 
 
 @pytest.mark.kernels
@@ -310,7 +310,7 @@ def test_the_error_of_a_turned_fold_is_the_same_once_the_quadrics_are_taken_out(
     buffer["weight"] = rng.uniform(0.1, 1, 60)
     across, normal, radius = (1.0, 0.0, 0.0), (0.0, 0.0, 1.0), rng.uniform(0.7, 1.0)
     freed, squares = smooth_part(buffer, 60, turned_frame(across, normal, 0.0), radius)
-    matrix = np.empty((TERMS, TERMS + 1))
+    matrix = np.empty((TERMS_OF_FOLD, TERMS_OF_FOLD + 1))
     for rounding in (0.0, 0.1, 0.3):
         angle, shift = rng.uniform(-1.5, 1.5), rng.uniform(-0.4, 0.4)
         whole = fold_error(buffer, 60, turned_frame(across, normal, angle), shift, radius, True, rounding, matrix)

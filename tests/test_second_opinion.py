@@ -18,7 +18,7 @@ import scantruss as st
 from scantruss.check.certify import certify
 from scantruss.check.distances import COMPARED_WITH_NODE
 from scantruss.grid.certificate import Certificate, Spread
-from scantruss.kernels.surface.mean_surface import ASIDE, FEWEST_FOR_PLANE, FEWEST_FOR_QUADRIC
+from scantruss.kernels.surface.mean_surface import FEWEST_FOR_PLANE, FEWEST_FOR_QUADRIC, PLANE_FROM_ASIDE
 from scantruss.surface.samples import SurfaceSamples
 
 LENGTH = 1.0
@@ -252,7 +252,7 @@ def compare_offsets(grid: st.Grid, found: Certificate, samples: SurfaceSamples) 
         across = np.linalg.svd(normal[None])[2][1:]
         x, y = across @ away.T
         terms = [np.ones(len(x)), x, y]
-        if len(away) >= FEWEST_FOR_QUADRIC and aside < ASIDE * LENGTH:
+        if len(away) >= FEWEST_FOR_QUADRIC and aside < PLANE_FROM_ASIDE * LENGTH:
             terms += [x * x, x * y, y * y]
         table, root = np.stack(terms, axis=1), np.sqrt(weight)
         fit = np.linalg.lstsq(table * root[:, None], away @ normal * root, rcond=None)[0]

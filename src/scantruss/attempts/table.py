@@ -29,8 +29,11 @@ AS_ASKED = "as asked"
 FRONT_LENGTHS = (1.0, 0.97, 1.04)
 COARSER_SAMPLES = (1.1, 1.2, 1.3)  # distances of the surface samples that are tried instead, in those of the settings
 COARSEST_SAMPLES = 0.5  # largest of them, in desired lengths
-SMOOTHED = (0.5, 1.0)  # scales over which a rough scan is smoothed where no grid passes without [member lengths]
-THINNER = (0.8, 0.0)  # girths below which limbs are cut off that are tried instead, in that of the settings
+SMOOTHING_SCALES = (
+    0.5,
+    1.0,
+)  # scales over which a rough scan is smoothed where no grid passes without [member lengths]
+THINNER_GIRTHS = (0.8, 0.0)  # girths below which limbs are cut off that are tried instead, in that of the settings
 FAULTS_WITHOUT_RIDGES = 6  # places at which ridges are given up, before they all are
 
 Starts = tuple[FieldStart, ...] | None  # how fronts are laid out; None: as the effort of the settings allows
@@ -121,10 +124,10 @@ def _smoothed_rows(kind: str, when: Callable[[AskedScan], bool]) -> list[Attempt
         AttemptRow(
             f"mean surface of a {kind} scan over {scale:g}",
             FIRST_TWO_LAYOUTS,
-            lambda scan, now, scales=SMOOTHED[: number + 1]: when(scan) and scan.can_be_smoothed(now, scales),  # type: ignore[misc]
+            lambda scan, now, scales=SMOOTHING_SCALES[: number + 1]: when(scan) and scan.can_be_smoothed(now, scales),  # type: ignore[misc]
             {"smooth_scale": scale, "ridge_angle": 0.0},
         )
-        for number, scale in enumerate(SMOOTHED)
+        for number, scale in enumerate(SMOOTHING_SCALES)
     ]
 
 
@@ -143,7 +146,7 @@ ROWS_TRIED: tuple[AttemptRow, ...] = (
     AttemptRow("fronts of other lengths", LATER_LAYOUTS),
     *(  # fewer limbs cut off, then none
         AttemptRow(f"limbs at {share:g} girth", FIRST_LAYOUT, lambda scan, now: scan.has_limbs_cut_off, shares={"limb_girth": share})
-        for share in THINNER
+        for share in THINNER_GIRTHS
     ),
     *_smoothed_rows("very rough", lambda scan: scan.rough > VERY_ROUGH_SCAN),  # so rough that hardly another passes
     AttemptRow("sharp edges again", ALL_BUT_FIRST_LAYOUT, lambda scan, now: scan.has_sharp_edges, {"sharp_edges": True}, stays=True),

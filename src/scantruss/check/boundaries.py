@@ -32,10 +32,10 @@ SPACINGS_OUT = 5.0  # ... and in spacings of the points
 # points that a grid stops short of at its boundary: how far off they are, beside the noise, at least [member lengths], how many together
 # are no strays, and how far apart they are at most [spacings of the points]
 WARN_SHORT_OF, FEWEST_BEYOND, BEYOND_TOGETHER = 0.2, 3, 4.0
-LEVEL = 0.5  # height over the grid of such a point, in its distance from it, at most: others are of a wall or a beam
-WARN_CUT = (
-    0.15  # distance of a corner of the boundary from the nearest node of it above which it is cut off [member lengths]
-)
+# height over the grid of such a point, in its distance from it, at most: others are of a wall or a beam
+MOST_HEIGHT_OF_LEVEL = 0.5
+# distance of a corner of the boundary from the nearest node of it above which it is cut off [member lengths]
+WARN_CUT = 0.15
 
 
 def places_aside(grid: Grid, boundary: Boundary, length: float) -> list[Fault]:
@@ -125,7 +125,7 @@ def stops_short(
     chained = curves_of([grid.nodes[chain] for chain in chains], [True] * len(chains))
     places, away = samples.scan[off], found.scan[off]
     beyond = _distances(chained, places) <= away + 1e-6 * members[off]
-    beyond &= np.abs(heights_over(grid, found.triangle[off], places)[0]) <= LEVEL * away
+    beyond &= np.abs(heights_over(grid, found.triangle[off], places)[0]) <= MOST_HEIGHT_OF_LEVEL * away
     off = off[beyond]
     if len(off) < FEWEST_BEYOND:
         return []

@@ -9,7 +9,7 @@ import numpy as np
 from ..grid.certificate import Fault, place_of
 from ..kernels.geometry.components import component_labels
 from ..surface.chosen_samples import DUPLICATE, KEPT
-from .gaps import ACROSS, by_x, is_empty_within
+from .gaps import PLACES_ACROSS_GAP, by_x, is_empty_within
 from .limits import PLACES_KEPT
 
 if TYPE_CHECKING:
@@ -103,5 +103,5 @@ def _filled_share(radius: float, inside: np.ndarray, beside: np.ndarray) -> floa
     some = beside[:: -(-len(beside) // POINTS_COMPARED)]
     apart = np.linalg.norm(some[:, None] - beside, axis=2)
     within = FILLS_WITHIN * float(np.median(np.partition(apart, NEIGHBOR_COUNTED, axis=1)[:, NEIGHBOR_COUNTED]))
-    away = np.array([np.linalg.norm(inside - place, axis=1).min() for place in radius * ACROSS])
+    away = np.array([np.linalg.norm(inside - place, axis=1).min() for place in radius * PLACES_ACROSS_GAP])
     return float((away <= within).mean())

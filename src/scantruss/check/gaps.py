@@ -22,24 +22,24 @@ if TYPE_CHECKING:
 
 #: places in a triangle that are looked at, by its corners; with its corners and the middles of its members none is farther than a sixth
 #: of a member from one of them
-PLACES = np.array([[2, 2, 2], [4, 1, 1], [1, 4, 1], [1, 1, 4]]) / 6.0
+PLACES_IN_TRIANGLE = np.array([[2, 2, 2], [4, 1, 1], [1, 4, 1], [1, 1, 4]]) / 6.0
 #: places a ninth of a member apart all over a triangle that may cover a gap: one of them is near the middle of that
 MORE_PLACES = np.array([[a, b, 9 - a - b] for a in range(10) for b in range(10 - a)]) / 9.0
 OFF_BOUNDARY = 1.0 / 6.0  # how far such places are from the boundary of the grid [heights of the triangle]
 # distance of one of the first places from the middle of a gap that makes its triangle one that may cover it [member lengths]
 NEAR_MIDDLE = 0.1
 HALF_WIDTH = 0.2  # least distance from the nearest point at which a place lies in a gap [member lengths]
-UNEVEN = 4.0  # ... and in usual distances: at random points none is farther, between lines of a scanner half as far
+# ... and in usual distances: at random points none is farther, between lines of a scanner half as far
+FAR_OF_USUAL = 4.0
 SOME_PLACES = 50  # places from which the usual distance is taken
 POINTS_AROUND = 45  # points up to twice that distance from which on an empty place is no accident, as exp(-n/3) tells
-POINTS_AROUND_MIDDLE = (
-    60  # ... where the emptiest of many places is chosen, which is farther from points than one at random
-)
-ACROSS = np.stack(np.meshgrid(*[np.linspace(-0.6, 0.6, 7)] * 2), axis=-1).reshape(
+# ... where the emptiest of many places is chosen, which is farther from points than one at random
+POINTS_AROUND_MIDDLE = 60
+PLACES_ACROSS_GAP = np.stack(np.meshgrid(*[np.linspace(-0.6, 0.6, 7)] * 2), axis=-1).reshape(
     -1, 2
 )  # places around another [reach]
 MOST_BRIDGED = 1.2  # width of a gap that is open there from which on a grid that bridges it fails [member lengths]
-OPEN = 0.1  # distance of the boundary from the nearest point from which on a gap there is open [member lengths]
+OPEN_FROM = 0.1  # distance of the boundary from the nearest point from which on a gap there is open [member lengths]
 
 WIDE_OPENING = 0.5  # longest side from which on an opening that is closed is said [member lengths]
 
@@ -74,7 +74,7 @@ def bridged_gaps(
     ordered, normals = by_x(points), _normals(grid)
     some = np.arange(0, len(places), len(places) // SOME_PLACES + 1)
     usual = np.median([_level(places[at], normals[owner[at]], away[at], ordered).min(initial=away[at]) for at in some])
-    least = np.maximum(least, UNEVEN * usual)
+    least = np.maximum(least, FAR_OF_USUAL * usual)
     covering = np.unique(owner[away > (least - NEAR_MIDDLE * members)[owner]])
     extra, theirs = _more_places(grid, covering)
     from_extra = _nearest(extra, points, boxes, samples.spacing)
@@ -183,7 +183,7 @@ def _emptiest(middle: np.ndarray, normal: np.ndarray, reach: float, points: np.n
     """Return the place (3,) in the plane around another that is farthest from all points (N, 3) by ascending x."""
     axes = np.linalg.svd(normal[None])[2][1:]
     around = points_within(middle, 2.0 * reach, points)
-    places: np.ndarray = middle + reach * ACROSS @ axes
+    places: np.ndarray = middle + reach * PLACES_ACROSS_GAP @ axes
     away = [np.linalg.norm(around - place, axis=1).min(initial=reach) for place in places]
     return places[int(np.argmax(away))]
 
@@ -222,9 +222,9 @@ def _places(grid: Grid) -> tuple[np.ndarray, np.ndarray]:
     of_node[grid.triangles] = np.arange(len(grid.triangles))[:, None]
     of_node[grid.edges[~inner]] = -1
     nodes = np.flatnonzero(of_node >= 0)
-    inside = np.einsum("pc,tcx->tpx", PLACES, grid.nodes[grid.triangles]).reshape(-1, 3)
+    inside = np.einsum("pc,tcx->tpx", PLACES_IN_TRIANGLE, grid.nodes[grid.triangles]).reshape(-1, 3)
     places = np.concatenate([inside, grid.nodes[grid.edges[inner]].mean(axis=1), grid.nodes[nodes]])
-    numbers = np.arange(len(grid.triangles)).repeat(len(PLACES))
+    numbers = np.arange(len(grid.triangles)).repeat(len(PLACES_IN_TRIANGLE))
     return places, np.concatenate([numbers, grid.edge_triangles[inner, 0], of_node[nodes]])
 
 
@@ -249,7 +249,7 @@ def _open_triangles(grid: Grid, points: np.ndarray, boxes: SearchBoxes, length: 
     away = np.empty(len(places))
     nearest_distances(places, points, boxes, 0.25 * length, away)
     ends = np.concatenate([members, members[:, :1].repeat(2, axis=1)])
-    return np.asarray(np.isin(grid.triangles, ends[away > OPEN * length]).any(axis=1))
+    return np.asarray(np.isin(grid.triangles, ends[away > OPEN_FROM * length]).any(axis=1))
 
 
 def _groups(grid: Grid, chosen: np.ndarray, middles: np.ndarray, radii: np.ndarray) -> np.ndarray:

@@ -21,25 +21,23 @@ if TYPE_CHECKING:
 
 HALF_EMPTY = 0.2  # distance from the nearest point at which the middle of a member is in empty space [member lengths]
 SPACINGS_EMPTY = 10.0  # ... and in spacings of the points
-AROUND_END = (
-    0.35  # radius around an end of a member within which points tell how the surface lies there [member lengths]
-)
+# radius around an end of a member within which points tell how the surface lies there [member lengths]
+AROUND_END = 0.35
 FEWEST_AT_END = 6  # fewest such points
 FLAT_AT_END = 0.1  # variance across the surface there, in the next one, above which they are none
-STEEP = 0.6  # sine of the angle between a member and the surface above which it leaves it
-FEWEST_MEMBERS = (
-    3  # such members at a node, and half of all, from which on it hangs: at a cliff or a horn there are fewer
-)
+STEEP_MEMBER_SINE = 0.6  # sine of the angle between a member and the surface above which it leaves it
+# such members at a node, and half of all, from which on it hangs: at a cliff or a horn there are fewer
+FEWEST_MEMBERS = 3
 # a spike is a node off an even sheet, as where a grid runs down a column or up a chimney: its members leave the sheet together
 LITTLE_EMPTY, SPACINGS_LITTLE_EMPTY = 0.1, 5.0  # as HALF_EMPTY and SPACINGS_EMPTY for the members of a spike
-EVEN = 0.8  # cosine of the angle between a spike and the normal of the sheet at the other end of its member
-LESS_STEEP, EVEN_FLAT = 0.3, 0.9  # as STEEP and EVEN of a spike that is poor: on a bent sheet one excludes the other
+EVEN_COSINE = 0.8  # cosine of the angle between a spike and the normal of the sheet at the other end of its member
+# as STEEP_MEMBER_SINE and EVEN_COSINE, of a spike that is poor: on a bent sheet one excludes the other
+LESS_STEEP_MEMBER_SINE, EVEN_FLAT_COSINE = 0.3, 0.9
 # a sheet that rises to a mast is not even, so that a node elsewhere on the mast is no spike: the points around it tell
 AROUND_ON_MAST = 0.6  # radius around such a node [member lengths]
-THIN_ON_MAST = (
-    0.15  # variance there across a mast, in that along it, at most: on a cone of 22 degrees and more it is larger
-)
-LEANS = 0.7  # cosine of the angle between a mast and the normal of the grid at the node, least
+# variance there across a mast, in that along it, at most: on a cone of 22 degrees and more it is larger
+THIN_ON_MAST = 0.15
+LEAST_MAST_COSINE = 0.7  # cosine of the angle between a mast and the normal of the grid at the node, least
 BESIDE_MAST = 1.2  # distance from the mast within which the sheet around it is looked for [member lengths]
 EDGE_AT_MAST = 0.15  # width of the edge of that sheet, which tells where it meets the mast [member lengths]
 OFF_ALONG_MAST = 1.0 / 3.0  # height over or under that edge, least [member lengths]
@@ -55,7 +53,9 @@ def hanging_nodes(grid: Grid, samples: SurfaceSamples, found: Distances, length:
     length : desired member length where the grid has none of its own [scan unit]
     """
     desired = np.full(len(grid.nodes), length) if grid.desired is None else grid.desired
-    nodes = np.union1d(_far_off(grid, samples, found, desired), _spikes(grid, samples, desired, STEEP, EVEN))
+    nodes = np.union1d(
+        _far_off(grid, samples, found, desired), _spikes(grid, samples, desired, STEEP_MEMBER_SINE, EVEN_COSINE)
+    )
     return _fault("hanging", "hangs on points off the surface, across empty space", grid, nodes)
 
 
@@ -65,8 +65,10 @@ def nodes_off_sheets(grid: Grid, samples: SurfaceSamples, length: float) -> list
     Parameters as of `hanging_nodes`.
     """
     desired = np.full(len(grid.nodes), length) if grid.desired is None else grid.desired
-    hanging = _spikes(grid, samples, desired, STEEP, EVEN)
-    standing = np.union1d(_spikes(grid, samples, desired, LESS_STEEP, EVEN_FLAT), _on_masts(grid, samples, desired))
+    hanging = _spikes(grid, samples, desired, STEEP_MEMBER_SINE, EVEN_COSINE)
+    standing = np.union1d(
+        _spikes(grid, samples, desired, LESS_STEEP_MEMBER_SINE, EVEN_FLAT_COSINE), _on_masts(grid, samples, desired)
+    )
     nodes = np.setdiff1d(standing, hanging)
     return _fault("off sheet", "has a node on points that stand off the sheet around it", grid, nodes)
 
@@ -102,7 +104,7 @@ def _far_off(grid: Grid, samples: SurfaceSamples, found: Distances, desired: np.
     for member in which.tolist():
         one, other = grid.edges[member]
         way = (grid.nodes[other] - grid.nodes[one]) / np.linalg.norm(grid.nodes[other] - grid.nodes[one])
-        doubted[member] = max(abs(normals[one] @ way), abs(normals[other] @ way)) > STEEP
+        doubted[member] = max(abs(normals[one] @ way), abs(normals[other] @ way)) > STEEP_MEMBER_SINE
     return np.flatnonzero(_hangs(grid, doubted, uses))
 
 
@@ -182,7 +184,7 @@ def _is_off_along(place: np.ndarray, normal: np.ndarray, length: float, points: 
         return False
     variances, axes = np.linalg.eigh(np.cov(around.T))
     axis = axes[:, 2]
-    if variances[1] > THIN_ON_MAST * variances[2] or abs(axis @ normal) < LEANS:
+    if variances[1] > THIN_ON_MAST * variances[2] or abs(axis @ normal) < LEAST_MAST_COSINE:
         return False
     beside = points_within(place, 2.0 * BESIDE_MAST * length, points) - around.mean(axis=0)
     height = beside @ axis

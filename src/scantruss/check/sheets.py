@@ -18,9 +18,10 @@ if TYPE_CHECKING:
     from ..surface.samples import SurfaceSamples
     from .distances import Distances
 
-COVER = 1.2  # distance from the nearest node on its sheet at which a part of the scan is left out [member lengths]
+# distance from the nearest node on its sheet at which a part of the scan is left out [member lengths]
+FARTHEST_COVERED = 1.2
 LEFT_OUT = 0.2  # share of the sheets that a grid may leave out
-DISCONNECTED = 4  # members between two nodes from which on neighbouring parts of the scan are torn apart
+MEMBERS_APART_TORN = 4  # members between two nodes from which on neighbouring parts of the scan are torn apart
 FEWEST_LINKS = 3  # fewest links between such parts that are no accident
 
 
@@ -28,7 +29,7 @@ def nodes_of_samples(grid: Grid, samples: SurfaceSamples, length: float) -> np.n
     """Return the node nearest to each sample on its sheet, (S,), -1 where all are too far; desired member length given [scan unit]."""
     surface = with_own_scratch(samples.surface)  # grids are certified side by side
     nearest = np.empty(len(samples.piece), np.int64)
-    nearest_nodes(surface, samples.boxes, grid.nodes, COVER * length, nearest)
+    nearest_nodes(surface, samples.boxes, grid.nodes, FARTHEST_COVERED * length, nearest)
     return nearest
 
 
@@ -71,7 +72,7 @@ def disconnected_place(grid: Grid, samples: SurfaceSamples, nearest: np.ndarray)
     """Return a place (3,) where the grid is torn though the scan is whole; None where there is none.
 
     Each node has a part of the scan, the samples nearest to it. Where two parts meet, their nodes must be near each other in the grid:
-    joined by fewer than `DISCONNECTED` members one after the other.
+    joined by fewer than `MEMBERS_APART_TORN` members one after the other.
 
     Parameters
     ----------
@@ -82,6 +83,6 @@ def disconnected_place(grid: Grid, samples: SurfaceSamples, nearest: np.ndarray)
     first = np.concatenate([[0], np.cumsum(np.bincount(pairs[:, 0], minlength=len(grid.nodes)))])
     ends = pairs[np.argsort(pairs[:, 0], kind="stable"), 1]
     links, normals = samples.surface.neighbors, samples.surface.normals
-    near = max(DISCONNECTED - 1, grid.panel_table.shape[1] // 2 + 1)  # a member more than nodes of one panel
+    near = max(MEMBERS_APART_TORN - 1, grid.panel_table.shape[1] // 2 + 1)  # a member more than nodes of one panel
     sample = first_disconnected(links, normals, nearest, first, ends, near, FEWEST_LINKS)
     return samples.surface.mean[sample] if sample >= 0 else None

@@ -32,7 +32,10 @@ MOST_FAR_PLACES = 10_000  # of those far from all points, how many are looked at
 # share of the places of a triangle that are nearer to a point than its usual distance, and least half width of a gap in those: at
 # random points one place in a million is as far, between lines of a scanner none
 SHARE_NEARER, UNUSUAL = 0.5, 3.2
-SURELY, SLENDER = 4.5, 5.0  # ... where no place of a gap is farther than the first of these, it is as many widths long
+SURELY_SLENDER, SLENDER_GAP = (
+    4.5,
+    5.0,
+)  # ... where no place of a gap is farther than the first of these, it is as many widths long
 FEWEST_ON_SIDE = 6  # places along a side of a triangle at least
 # half width from which on a gap is a wide one, which is looked for elsewhere [member lengths]
 WIDEST_HALF = 0.4
@@ -42,9 +45,8 @@ TO_MIDDLE = 0.35  # step towards the middle of a gap [half widths]
 BESIDE_GAP = np.array([1.3, 1.6, 1.9])  # how far away [half widths]
 FILLED_WITHIN = 0.3  # distance of most places beside a gap from the nearest point, at most [half widths]
 LONG_GAP = 0.5  # length from which on a narrow gap is said [member lengths]
-LONG_MIDDLE = (
-    0.25  # ... and of its middle, from half a width off its ends: a round one is looked for elsewhere [member lengths]
-)
+# ... and of its middle, from half a width off its ends: a round one is looked for elsewhere [member lengths]
+LONG_MIDDLE = 0.25
 IN_A_ROW = 2.0  # gap between places of one narrow gap [steps between places]
 FEWEST_IN_GAP = 4  # in one gap
 # length up to which a gap is nearly round [widths]: then points must lie around it that make it no accident, as around a round one
@@ -123,7 +125,7 @@ def narrow_gaps(
         gap = LeftOut("gap", 0, 0.0, place_of(middle + samples.origin), size := along + width)
         if len(own) < FEWEST_IN_GAP or size < LONG_GAP * member or along < LONG_MIDDLE * member:
             continue
-        if along < SLENDER * width and not (half[own] * UNUSUAL > SURELY * least[own]).any():
+        if along < SLENDER_GAP * width and not (half[own] * UNUSUAL > SURELY_SLENDER * least[own]).any():
             continue
         here = places[own] + samples.origin
         if along < NEARLY_ROUND * width and feet.within(middle, width) < POINTS_AROUND_MIDDLE:

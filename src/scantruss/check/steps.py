@@ -18,11 +18,11 @@ if TYPE_CHECKING:
     from .distances import Distances
 
 # width of the columns in which heights over the grid are compared, at least [spacings of the points, member lengths]
-COLUMN = (2.5, 0.05)
+SIZE_OF_COLUMN = (2.5, 0.05)
 # least height of a step beyond the noise [columns, member lengths]: a slope of 45 degrees is none
-STEP = (1.6, 0.08)
+HEIGHT_OF_STEP = (1.6, 0.08)
 FEWEST_IN_COLUMN, SPARED_FROM = 4, 6  # points in a column, and from how many on its highest and its lowest do not count
-TOGETHER = 1.5  # gap within a line of steps [columns]
+GAP_IN_LINE = 1.5  # gap within a line of steps [columns]
 # length from which on a line is said [member lengths]: along beams 4 to 14, on the shells, twins and real scans without any 1.7 at most
 LONG_STEP = 3.0
 
@@ -42,8 +42,8 @@ def unfollowed_steps(
         return []
     points, triangle, member = samples.scan[near], found.triangle[near], float(members[near].mean())
     height, normal = heights_over(grid, triangle, points)
-    column = max(COLUMN[0] * samples.spacing, COLUMN[1] * member)
-    least = max(STEP[0] * column, STEP[1] * member) + NOISES_OFF * float(np.median(found.noise))
+    column = max(SIZE_OF_COLUMN[0] * samples.spacing, SIZE_OF_COLUMN[1] * member)
+    least = max(HEIGHT_OF_STEP[0] * column, HEIGHT_OF_STEP[1] * member) + NOISES_OFF * float(np.median(found.noise))
     if np.abs(height).max() <= 0.5 * least:  # then no column is as high
         return []
     order, begin, end = _columns(points - height[:, None] * normal, height, column)
@@ -53,7 +53,7 @@ def unfollowed_steps(
     if not len(high):
         return []
     places, step = points[order[begin[high]]], step[high]
-    line = points_together(places, np.full(len(places), TOGETHER * column))
+    line = points_together(places, np.full(len(places), GAP_IN_LINE * column))
     lines = [
         np.flatnonzero(line == number) for number in np.flatnonzero(np.bincount(line) * column >= LONG_STEP * member)
     ]

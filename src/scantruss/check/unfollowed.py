@@ -24,9 +24,12 @@ if TYPE_CHECKING:
 # of one member lie that far off it, and at least [member lengths]; in between by the folds between a triangle and its neighbours
 NOT_FOLLOWED, LEVEL_NOT_FOLLOWED = 0.125, 0.02
 SAG_OF_FOLD = 0.43  # ... of a bent surface, with half as much again to be sure [member lengths, at a radian]
-CUBE, LEAST_CUBE = 0.25, 0.1  # widest and narrowest cubes in which most points must lie that far off [member lengths]
+WIDEST_CUBE, NARROWEST_CUBE = (
+    0.25,
+    0.1,
+)  # widest and narrowest cubes in which most points must lie that far off [member lengths]
 SPACINGS_OF_CUBE = 4.0  # width of the cubes between these: some points lie in each [spacings of the points]
-LONG = 6.0  # longest side of the box around such a part from which on it is no bump that members round off [member lengths]
+LENGTH_OF_LONG_PART = 6.0  # longest side of the box around such a part from which on it is no bump that members round off [member lengths]
 WARN_SHARE = 0.01  # share of the points in such a part from which on it is said
 # share of the points that a grid is to follow above which it does not follow the scan, and how far off those are at least, beyond
 # the noise [member lengths]: as where one row of triangles runs along a bent strip; of two layers, followed by turns, it is half at most
@@ -40,7 +43,7 @@ SHARE_OF_COARSE, FAR_OFF_COARSE, TWENTIETH = 0.25, 0.24, 0.95
 MOST_OFF_MEAN, OFF_MEAN = 0.33, 0.2
 # distance from the grid, beyond the noise, from which on points are of a peak that it cuts off [member lengths], and how many these
 # are at least, in all and times as many as points of a line as long
-PEAK, FEWEST_OF_PEAK, WIDTH_OF_PEAK = 0.3, 12, 3.0
+HEIGHT_OF_PEAK, FEWEST_OF_PEAK, WIDTH_OF_PEAK = 0.3, 12, 3.0
 # distance of a crest from a grid from which on it is cut off, and share of its places that may be nearer [member lengths]
 CREST_OFF, SHARE_OF_CREST = 0.1, 0.6
 CRESTS_MEET_WITHIN = 1.5  # distance of the ends of two crests within which they meet in a corner [member lengths]
@@ -66,7 +69,7 @@ def unfollowed_parts(
     points = np.bincount(part)
     large = np.flatnonzero(points >= WARN_SHARE * len(samples.scan))
     parts = [which[part == number] for number in large[np.argsort(-points[large], kind="stable")].tolist()]
-    long = [own for own in parts if _size(own, samples) >= LONG * members[own].mean()]
+    long = [own for own in parts if _size(own, samples) >= LENGTH_OF_LONG_PART * members[own].mean()]
     if not long and len(which) > WARN_UNFOLLOWED * chosen.sum():
         what, share = "smooths out waves or folds of the scan", f"{len(which) / chosen.sum():.0%}"
         return [_points_off(samples, found, which, f"{what}: {share}", "; shorter members follow them")]
@@ -128,7 +131,9 @@ def rounded_peaks(
     Points far off that hang together are a surface, points that stand alone are none. Parameters as of `unfollowed_parts`.
     """
     noise = float(np.median(found.noise))
-    off = np.flatnonzero(chosen & (found.scan > PEAK * members + NOISES_OFF * noise) & (found.scan <= members))
+    off = np.flatnonzero(
+        chosen & (found.scan > HEIGHT_OF_PEAK * members + NOISES_OFF * noise) & (found.scan <= members)
+    )
     if len(off) < FEWEST_OF_PEAK:
         return []
     part = points_together(samples.scan[off], np.full(len(off), SPACINGS_OF_CUBE * samples.spacing))
@@ -169,7 +174,7 @@ def _off(
 def _cube(samples: SurfaceSamples, members: np.ndarray) -> float:
     """Return the width of the cubes in which most points must lie off [scan unit]."""
     longest = float(members.max())
-    return min(max(SPACINGS_OF_CUBE * samples.spacing, LEAST_CUBE * longest), CUBE * longest)
+    return min(max(SPACINGS_OF_CUBE * samples.spacing, NARROWEST_CUBE * longest), WIDEST_CUBE * longest)
 
 
 def _followed_to(grid: Grid) -> np.ndarray:

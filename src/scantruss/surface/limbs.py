@@ -24,7 +24,7 @@ SUSPECT_WITHIN = 1.1
 FINE_SAMPLES = 0.1  # radius of the samples by which girths are measured [member lengths]
 HALF_SECTION = 0.15  # half the thickness of a section [desired lengths]
 LARGEST_GIRTH = 1.2  # largest girth that is measured [girth below which limbs are cut off]
-SMOOTHINGS = 3  # passes in which a sample becomes what most of those linked to it are
+PASSES_OF_MAJORITY = 3  # passes in which a sample becomes what most of those linked to it are
 FEWEST_OF_LIMB = 12  # fewest samples of a part that is cut off
 BLUNT_END = 2.0  # least area of an end that is wider than a member [desired lengths^2]
 SURE_GIRTH = 0.95  # girth at the thinnest twentieth of a limb above which it is not cut off [girth below which limbs are cut off]
@@ -280,7 +280,7 @@ class _Parts:
 def _smoothed(marks: np.ndarray, beside: np.ndarray) -> np.ndarray:
     """Return marks (S,) bool as most of the samples linked to each have them."""
     linked = beside >= 0
-    for _ in range(SMOOTHINGS):
+    for _ in range(PASSES_OF_MAJORITY):
         marks = (marks[beside] & linked).sum(axis=1) + marks > 0.5 * (linked.sum(axis=1) + 1)
     return marks
 

@@ -24,10 +24,10 @@ LENGTH_STEP = 1.6  # step from one such length to the next
 NEAR_RODS = 3.0  # distance between samples that are beside each other there [sample radii]
 AREA_OF_REST = 1.0  # area of a part beside rods below which it is a piece of them [square of the member length]
 BEHIND_WIDTH = 1.25  # distance from its axis within which a rod goes on behind a sheet [half its width]
-TILT = 0.06  # by which that axis may be wrong, as it is taken from a part of a rod [rad]
+TILT_OF_AXIS = 0.06  # by which that axis may be wrong, as it is taken from a part of a rod [rad]
 FEWEST_OF_STRAIGHT = 12  # fewest samples of a rod whose axis is known
 WIDEST_ROD = 0.4  # half the width of what goes on, at most [member lengths]
-STUB = 0.4  # distance from the sheet that a rod behind it reaches at least [member lengths]
+LEAST_STUB = 0.4  # distance from the sheet that a rod behind it reaches at least [member lengths]
 JUNCTIONS_LOOKED_AT = 8  # places of a group of rods at which it may go on as a sheet, at most
 FLAT_ACROSS = 0.1  # largest variance across a strip, in that over its width; half a tube has 0.19
 PLACES_OF_STRIP = 16  # places of a strip at which it is looked at, at most
@@ -211,14 +211,14 @@ def _behind_sheets(found: Linked, rod: np.ndarray, length: float) -> np.ndarray:
         width = float(np.median(away[own]))  # of most of it, without what was taken of a sheet where it ends
         if not _thin(variances[None])[0] or width > WIDEST_ROD * length:  # several, as the frames of a scaffold
             continue
-        near = away <= BEHIND_WIDTH * width + TILT * np.abs(at)
+        near = away <= BEHIND_WIDTH * width + TILT_OF_AXIS * np.abs(at)
         along_axes.append(~rod & near & (np.abs(at) < np.abs(at[own]).max() + 2.0 * float(np.ptp(at[own]))))
     if along_axes:
         alive = ~rod & ~np.logical_or.reduce(along_axes)
         spreads, off, count = _spreads(found, alive, COARSE_REACH * length)
         stands_off = (off > np.maximum(END_OFFSET * length, 2.0 * np.sqrt(spreads[:, 0]))) | (count < SAMPLES_OF_SHEET)
         for part in along_axes:
-            is_stub = off[part & (count >= SAMPLES_OF_SHEET)] > STUB * length
+            is_stub = off[part & (count >= SAMPLES_OF_SHEET)] > LEAST_STUB * length
             if is_stub.any():  # else it is the sheet where the rod ends
                 goes_on |= part & stands_off
     return goes_on

@@ -1,8 +1,8 @@
 """Pairs of triangles that may intersect: those close together, except those proved to be apart in floating point.
 
 A proof is a plane between the two, with both certainly on its sides whatever rounding did; the caller decides the few pairs left in
-exact numbers. Differences of nearby nodes are rounded once, so the error of a sum of products of such differences is at most ROUNDING
-times the sum of the absolute products.
+exact numbers. Differences of nearby nodes are rounded once, so the error of a sum of products of such differences is at most
+ERROR_OF_PRODUCT times the sum of the absolute products.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from ..geometry.boxes import SearchBoxes, box_index, put, slot_of
 from ..geometry.triangles import across_edge
 from ..geometry.vectors import Vector, cross, dot, row, subtract, unit
 
-ROUNDING = 1e-14  # relative error of a product of three differences, with a margin: forty times the last bit
+ERROR_OF_PRODUCT = 1e-14  # relative error of a product of three differences, with a margin: forty times the last bit
 BALL_MARGIN = 1.000001  # by which balls around triangles are larger, whatever rounding did
 FOLDED_BACK = 1e-6  # cosine times the largest squared side by which two wings point apart
 
@@ -24,7 +24,7 @@ def _certain_side(axis: Vector, arm: Vector) -> int:
     """Sign of axis . arm: 1 or -1 if rounding cannot change it, else 0."""
     value = dot(axis, arm)
     size = abs(axis[0] * arm[0]) + abs(axis[1] * arm[1]) + abs(axis[2] * arm[2])
-    if abs(value) <= ROUNDING * size:
+    if abs(value) <= ERROR_OF_PRODUCT * size:
         return 0
     return 1 if value > 0.0 else -1
 
@@ -36,7 +36,7 @@ def _certain_turn(a: Vector, b: Vector, c: Vector) -> int:
     size = abs(a[0]) * (abs(b[1] * c[2]) + abs(b[2] * c[1]))
     size += abs(a[1]) * (abs(b[2] * c[0]) + abs(b[0] * c[2]))
     size += abs(a[2]) * (abs(b[0] * c[1]) + abs(b[1] * c[0]))
-    if abs(value) <= ROUNDING * size:
+    if abs(value) <= ERROR_OF_PRODUCT * size:
         return 0
     return 1 if value > 0.0 else -1
 
@@ -92,7 +92,7 @@ def _gap(axis: Vector, a: Vector, b: Vector, c: Vector, d: Vector, e: Vector) ->
     most = 0.0
     for arm in (a, b, c, d, e):
         most = max(most, abs(axis[0] * arm[0]) + abs(axis[1] * arm[1]) + abs(axis[2] * arm[2]))
-    margin = 2.0 * ROUNDING * most
+    margin = 2.0 * ERROR_OF_PRODUCT * most
     low, high = min(0.0, pa, pb), max(0.0, pa, pb)
     return min(pc, pd, pe) > high + margin or max(pc, pd, pe) < low - margin
 

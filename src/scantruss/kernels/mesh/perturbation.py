@@ -41,7 +41,7 @@ AREA_LISTED, AREA_UNFIT, AREA_OUT_OF_BOUNDS = 0, 1, 2  # what became of listing 
 MOVES_DRAWN, FLIPS_DRAWN = 5, 3
 MOST_KEPT_AT_NODE = 20  # most moves that are kept at one node before the next one is searched
 SMALLEST_FALL = 1e-4  # fall of the energy that counts
-CHANCES = 100_000  # numbers that chance is drawn of
+RANDOM_NUMBERS = 100_000  # numbers that chance is drawn of
 
 
 class Area(NamedTuple):
@@ -315,7 +315,7 @@ def perturb(
     more = area.spare[0] - net.spare[0]
     luck = -SMALLEST_FALL
     if temperature > 0.0:
-        luck = -temperature * math.log((random_choice(area, CHANCES) + 1.0) / (CHANCES + 1.0))
+        luck = -temperature * math.log((random_choice(area, RANDOM_NUMBERS) + 1.0) / (RANDOM_NUMBERS + 1.0))
     if after - before < worth * more - bend * more * more + luck:
         area.paid[0] += 1
         return True

@@ -11,10 +11,12 @@ from ..geometry.boxes import SearchBoxes, box_index, slot_of
 from ..geometry.vectors import across, cross, dot, norm, row, smallest_eigenvector, subtract
 from .local_surface import Surface, flood
 
-DIRECTIONS = 12  # in which the width of a section is measured: the girth of its convex hull is pi mean widths (Cauchy)
+# in which the width of a section is measured: the girth of its convex hull is pi mean widths (Cauchy)
+DIRECTIONS_OF_WIDTH = 12
 FACING_OPPOSITE = -0.3  # cosine between the normals of two samples below which they lie on opposite sides of a limb
-CLOSED = 0.6  # largest mean normal of a section that is closed; half a pipe has 0.64, a strip 1
-INWARD = -0.3  # mean cosine between normals and arms from the middle of a section below which it is a hole, no limb
+MOST_MEAN_NORMAL = 0.6  # largest mean normal of a section that is closed; half a pipe has 0.64, a strip 1
+# mean cosine between normals and arms from the middle of a section below which it is a hole, no limb
+INWARD_COSINE = -0.3
 
 
 @kernel
@@ -96,11 +98,11 @@ def _girth_of(surface: Surface, section: np.ndarray, count: int, a: tuple[float,
         p, n = row(surface.mean, section[i]), row(surface.normals, section[i])
         arm, face = (dot(p, u) - x, dot(p, v) - y, 0.0), (dot(n, u), dot(n, v), 0.0)
         outward += dot(arm, face) / max(norm(arm) * norm(face), 1e-300) / count
-    if nx * nx + ny * ny > CLOSED * CLOSED or outward < INWARD:
+    if nx * nx + ny * ny > MOST_MEAN_NORMAL * MOST_MEAN_NORMAL or outward < INWARD_COSINE:
         return math.inf
     total = 0.0
-    for k in range(DIRECTIONS):
-        turn = math.pi * k / DIRECTIONS
+    for k in range(DIRECTIONS_OF_WIDTH):
+        turn = math.pi * k / DIRECTIONS_OF_WIDTH
         c, d = math.cos(turn), math.sin(turn)
         low, high = math.inf, -math.inf
         for i in range(count):
@@ -108,7 +110,7 @@ def _girth_of(surface: Surface, section: np.ndarray, count: int, a: tuple[float,
             t = c * dot(p, u) + d * dot(p, v)
             low, high = min(low, t), max(high, t)
         total += high - low
-    return math.pi * total / DIRECTIONS
+    return math.pi * total / DIRECTIONS_OF_WIDTH
 
 
 @kernel

@@ -23,7 +23,7 @@ FIT_TURNS = 4  # fits, each with the weights that follow from the one before
 KNOWN_TURNS = 3  # fits that turn the plane, too
 OFF_THE_FIT = 1.5  # distance from the fit, in mean ones, at which a point weighs half
 # distance of the centre of the points from the middle of the ball, in radii, from which on a plane is fitted
-ASIDE = 0.2
+PLANE_FROM_ASIDE = 0.2
 FEWEST_FOR_QUADRIC, FEWEST_FOR_PLANE = 12, 6  # fewest points to which a quadric, or a plane, is fitted
 
 
@@ -82,7 +82,7 @@ def _terms(buffer: np.ndarray, taken: int, radius: float, normal: Vector) -> int
     total = max(total, 1e-300)
     centre = (x / total, y / total, z / total)
     aside = norm(along(centre, -dot(centre, normal), normal))
-    if taken >= FEWEST_FOR_QUADRIC and aside < ASIDE * radius:
+    if taken >= FEWEST_FOR_QUADRIC and aside < PLANE_FROM_ASIDE * radius:
         return TERMS_OF_QUADRIC
     return TERMS_OF_PLANE if taken >= FEWEST_FOR_PLANE else 1
 

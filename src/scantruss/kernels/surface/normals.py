@@ -11,10 +11,11 @@ from ..geometry.boxes import SearchBoxes, search
 from ..geometry.vectors import Vector, along, dot, norm, row, smallest_eigenvector, spread_along, subtract, unit
 
 ASIDE_OF_EDGE = 0.25  # least distance of the middle of what is around a sharp edge from it [reach]
-BEHIND = 0.35  # samples nearer than this show neither side of the edge [reach]
-OPENS = 0.4  # share of the distance between both sides that must grow with that from the edge, at least
-NARROWEST, WIDEST = 0.1, 1.0  # tangent of half the angle between both sides, at least and at most
-SCATTER = 0.5  # rms distance of the samples from both sides, at most, in their mean distance from the plane between
+NEITHER_SIDE_WITHIN = 0.35  # samples nearer than this show neither side of the edge [reach]
+LEAST_OPENING = 0.4  # share of the distance between both sides that must grow with that from the edge, at least
+NARROWEST_EDGE, WIDEST_EDGE = 0.1, 1.0  # tangent of half the angle between both sides, at least and at most
+# rms distance of the samples from both sides, at most, in their mean distance from the plane between
+MOST_SCATTER = 0.5
 FEWEST_BEHIND = 6  # fewest samples that show the two sides
 MOST_AROUND_EDGE = 1024  # most samples that are looked at around an edge
 EACH_SIDE = 0.2  # share of the samples that must lie on each side of an edge
@@ -127,7 +128,7 @@ def face_off_edges_of(
         for k in range(count):
             d = subtract(row(mean, found[k]), place)
             t, h = dot(d, inwards), dot(d, between)
-            if t > BEHIND * reach:
+            if t > NEITHER_SIDE_WITHIN * reach:
                 n, above = n + 1, above + (h > 0.0)
                 h = abs(h)
                 st, sh, stt, sth, shh = st + t, sh + h, stt + t * t, sth + t * h, shh + h * h
@@ -136,7 +137,7 @@ def face_off_edges_of(
         spread = stt - st * st / n
         slope = (sth - st * sh / n) / spread if spread > 0.0 else 0.0
         off = math.sqrt(max(shh - sh * sh / n - slope * slope * spread, 0.0) / n)
-        if NARROWEST < slope < WIDEST and slope * st > OPENS * sh and off * n < SCATTER * sh:
+        if NARROWEST_EDGE < slope < WIDEST_EDGE and slope * st > LEAST_OPENING * sh and off * n < MOST_SCATTER * sh:
             normals[thick[i], 0], normals[thick[i], 1], normals[thick[i], 2] = -a, -b, -c
 
 

@@ -21,7 +21,7 @@ from .local_surface import Surface, flood, gather_points, walk
 from .turned_folds import QuadricFreePoints, smooth_part, turned_fold_error
 
 EITHER_SIDE = -2.0  # no cosine is so low: the points of both sides of a ridge count
-TERMS = 8  # terms of the folded surface: k0 to k7
+TERMS_OF_FOLD = 8  # terms of the folded surface: k0 to k7
 SLOPE_OF_SIDE, BEND_OF_SIDE, TERMS_OF_SIDE = 1, 2, 4  # of a side: 1, s, s^2 and t, with s the distance from the crest
 FOLD = record_type(
     place=(np.float64, 3),  # on the crest [scan unit]
@@ -110,7 +110,7 @@ def fold_error(
     where none fits.
     """
     c, e, n = frame
-    term = np.empty(TERMS + 1)
+    term = np.empty(TERMS_OF_FOLD + 1)
     matrix[:, :] = 0.0
     squares = 0.0
     for i in range(taken):
@@ -119,30 +119,33 @@ def fold_error(
         size = math.sqrt(u * u + rounding * rounding)
         term[0], term[1], term[2], term[3], term[4], term[5] = 1.0, t, t * t, u, u * u, u * t
         term[6], term[7] = (size, u * size) if folded else (u * u * u, 0.0)
-        term[TERMS] = h
+        term[TERMS_OF_FOLD] = h
         w = buffer[i].weight
         squares += w * h * h
-        for r in range(TERMS):
+        for r in range(TERMS_OF_FOLD):
             wr = w * term[r]
-            for k in range(r, TERMS + 1):
+            for k in range(r, TERMS_OF_FOLD + 1):
                 matrix[r, k] += wr * term[k]
-    right = np.empty(TERMS)
-    for r in range(TERMS):
+    right = np.empty(TERMS_OF_FOLD)
+    for r in range(TERMS_OF_FOLD):
         for k in range(r):
             matrix[r, k] = matrix[k, r]
         matrix[r, r] += REGULARIZATION * matrix[0, 0]
-        right[r] = matrix[r, TERMS]
-    if not solve_normal_equations(matrix, TERMS):
+        right[r] = matrix[r, TERMS_OF_FOLD]
+    if not solve_normal_equations(matrix, TERMS_OF_FOLD):
         return np.inf
-    for r in range(TERMS):
-        squares -= right[r] * matrix[r, TERMS]
+    for r in range(TERMS_OF_FOLD):
+        squares -= right[r] * matrix[r, TERMS_OF_FOLD]
     return max(squares, 0.0)
 
 
 @kernel
 def jump_of(matrix: np.ndarray, rounding: float, reach: float) -> float:
     """Angle by which a fold turns from `reach` before its line to as far behind it, the bend of the sides aside [radian]."""
-    slope, jump = matrix[3, TERMS], matrix[6, TERMS] * reach / math.sqrt(reach * reach + rounding * rounding)
+    slope, jump = (
+        matrix[3, TERMS_OF_FOLD],
+        matrix[6, TERMS_OF_FOLD] * reach / math.sqrt(reach * reach + rounding * rounding),
+    )
     return abs(math.atan(slope + jump) - math.atan(slope - jump))
 
 
@@ -226,7 +229,7 @@ def is_folded(surface: Surface, sample: int, radius: float, least: float, buffer
     taken = gather_points(surface, count, place, radius, POINTS_OF_FIRST_LOOK, n, EITHER_SIDE, buffer)
     if taken < FEWEST_OF_FIRST_LOOK or norm(c) < 0.5:
         return False
-    matrix = np.empty((TERMS, TERMS + 1))
+    matrix = np.empty((TERMS_OF_FOLD, TERMS_OF_FOLD + 1))
     frame = turned_frame(c, n, 0.0)
     error, bend = np.inf, 0.0
     rounding, reach = FIRST_ROUNDING * surface.length / radius, 0.5 * surface.length / radius
@@ -290,7 +293,7 @@ def fit_fold(
     taken = gather_points(surface, count, place, radius, int(surface.patch_points), n, EITHER_SIDE, buffer)
     if taken < FEWEST_OF_FOLD or norm(c) < 0.5:
         return False
-    matrix = np.empty((TERMS, TERMS + 1))
+    matrix = np.empty((TERMS_OF_FOLD, TERMS_OF_FOLD + 1))
     points, squares = smooth_part(buffer, taken, turned_frame(c, n, 0.0), radius)
     angle = shift = 0.0
     reach, swing = FIRST_SHIFT, FIRST_TURN
@@ -321,16 +324,16 @@ def fit_fold(
     for i in range(taken):
         total += buffer[i].weight
     across, ahead, _ = frame
-    crest = matrix[0, TERMS] + matrix[6, TERMS] * rounding
+    crest = matrix[0, TERMS_OF_FOLD] + matrix[6, TERMS_OF_FOLD] * rounding
     fold.bend, meet = bend_of(buffer, taken, frame, (shift, crest), radius)
     aside = rounding > 0.0 or abs(meet) > LEAST_MEETING  # then the line is not yet the crest
     if aside and abs(meet) < FARTHEST_MEETING and fold.bend > SHARP_ENOUGH:
         size = math.sqrt(meet * meet + rounding * rounding)
-        crest = matrix[0, TERMS] + meet * (matrix[3, TERMS] + meet * matrix[4, TERMS])
-        crest += size * (matrix[6, TERMS] + meet * matrix[7, TERMS])
+        crest = matrix[0, TERMS_OF_FOLD] + meet * (matrix[3, TERMS_OF_FOLD] + meet * matrix[4, TERMS_OF_FOLD])
+        crest += size * (matrix[6, TERMS_OF_FOLD] + meet * matrix[7, TERMS_OF_FOLD])
         shift += meet
     put_vector(fold.place, along(along(place, shift * radius, across), crest * radius, n))
-    put_vector(fold.ahead, unit(along(ahead, matrix[1, TERMS], n)))
+    put_vector(fold.ahead, unit(along(ahead, matrix[1, TERMS_OF_FOLD], n)))
     fold.gain = min((smooth - least) * taken / max(least, 1e-12), LARGEST_GAIN)
     fold.off = radius * math.sqrt(least / max(total, 1e-300))
     return True
