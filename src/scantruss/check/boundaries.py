@@ -62,7 +62,8 @@ def boundary_left(grid: Grid, boundary: Boundary, length: float) -> list[Fault]:
     Parameters as of `places_aside`.
     """
     for aside in _figures_at_boundary(grid, boundary, length)[:1]:
-        count, around = len(aside.values), int((grid.edge_uses == 1).sum())
+        near = aside.values[aside.values <= MOST_BEYOND]  # what lies farther off is missed, or a bay
+        count, around = len(near), int((grid.edge_uses == 1).sum())
         fault = aside.beyond(aside.poor)
         if fault is not None and count >= FEWEST_LEFT and count > MOST_LEFT * around:
             words = (
