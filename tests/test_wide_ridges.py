@@ -61,7 +61,7 @@ def test_a_box_has_all_of_its_wide_edges_or_none(cloud: PointCloud) -> None:
     samples, _ = find_boundary(sample_surface(cloud, settings), settings)
     plain = make_grid(cloud, Attempt(settings))
     crests = wide_folds(samples, settings)
-    assert crests_cut_off(plain, crests, SIZE) in ((), tuple(range(len(crests))))
+    assert len(crests) > 0 and crests_cut_off(plain, crests, SIZE) == tuple(range(len(crests)))
     assert wide_folds(samples, settings.replace(ridge_angle=0.0)) == []
 
 
@@ -70,14 +70,14 @@ def test_a_grid_with_wide_ridges_is_nearer_to_the_scan(cloud: PointCloud) -> Non
     settings = Settings(length=SIZE)
     plain, made = make_grid(cloud, Attempt(settings)), grid_from_points(cloud, settings)
     assert made.certificate is not None and made.certificate.passed
-    assert made == plain or follows_better(made, plain)
+    assert len(made.lines) > len(plain.lines) and follows_better(made, plain)
     assert not follows_better(plain, made)
 
 
 @compiled_only
 def test_more_effort_does_not_leave_the_wide_ridges(cloud: PointCloud) -> None:
     normal, best = (grid_from_points(cloud, Settings(length=SIZE, effort=effort)) for effort in ("normal", "best"))
-    assert (len(normal.lines) > 0) == (len(best.lines) > 0)
+    assert len(normal.lines) > 60 and len(best.lines) > 60  # twelve edges of seven members and more
 
 
 def _with(grid: Grid, p99: float, kinds: tuple[str, ...] = ()) -> Grid:

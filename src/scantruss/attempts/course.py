@@ -64,7 +64,7 @@ class AttemptCourse:
         self._passed: Grid | None = None
 
     def __iter__(self) -> Iterator[Attempt]:
-        """Yield each attempt, once what came of the one before was told by `passed` or `failed`."""
+        """Yield each attempt, once what came of the one before was noted by `passed` or `failed`."""
         # ends: the list ends, a place of ridges is given up once, rods are left out once, the effort is lowered once
         while attempt := self._next():
             self._limit.begin()

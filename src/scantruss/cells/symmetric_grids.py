@@ -92,17 +92,7 @@ def symmetric_hexagons(
 ) -> Grid:
     """Return a grid of hexagons that keeps mirror planes or a rotation exactly: the dual of triangles that do.
 
-    Parameters
-    ----------
-    cloud : PointCloud
-    settings : Settings
-        `symmetry` and all others.
-    grid_of : callable
-        Makes a grid of a cloud by settings without symmetry.
-    progress : callable, optional
-        ``progress(stage, share)``.
-    keep_failed : bool
-        Return a grid even if it fails its certificate.
+    Parameters as of `symmetric_grid`.
 
     Raises
     ------

@@ -30,7 +30,7 @@ MOST_LEFT, FEWEST_LEFT = 0.25, 6
 MOST_BEYOND, COVERED_WITHIN, EMPTY_FROM = 1.0, 0.2, 0.25
 SPACINGS_OUT = 5.0  # ... and in spacings of the points
 # points that a grid stops short of at its boundary: how far off they are, beside the noise, at least [member lengths], how many together
-# are no strays, and how far apart they are at most [spacings of the points]
+# are no outliers, and how far apart they are at most [spacings of the points]
 WARN_SHORT_OF, FEWEST_BEYOND, BEYOND_TOGETHER = 0.2, 3, 4.0
 # height over the grid of such a point, in its distance from it, at most: others are of a wall or a beam
 MOST_HEIGHT_OF_LEVEL = 0.5
@@ -61,16 +61,19 @@ def boundary_left(grid: Grid, boundary: Boundary, length: float) -> list[Fault]:
 
     Parameters as of `places_aside`.
     """
-    for aside in _figures_at_boundary(grid, boundary, length)[:1]:
-        near = aside.values[aside.values <= MOST_BEYOND]  # what lies farther off is missed, or a bay
-        count, around = len(near), int((grid.edge_uses == 1).sum())
-        fault = aside.beyond(aside.poor)
-        if fault is not None and count >= FEWEST_LEFT and count > MOST_LEFT * around:
-            words = (
-                f"leaves the boundary of the scan at {count} of its {around} members, by up to {aside.values.max():.2f}"
-            )
-            return [replace(fault, kind="beyond", words=words)]
-    return []
+    figures = _figures_at_boundary(grid, boundary, length)
+    if not figures:
+        return []
+    aside = figures[0]
+    near = aside.values <= MOST_BEYOND  # what lies farther off is missed, or a bay
+    aside = replace(aside, values=aside.values[near], places=aside.places[near])
+    count, around = len(aside.values), int((grid.edge_uses == 1).sum())
+    fault = aside.beyond(aside.poor)
+    if fault is None or count < FEWEST_LEFT or count <= MOST_LEFT * around:
+        return []
+    most = float(aside.values.max())
+    words = f"leaves the boundary of the scan at {count} of its {around} members, by up to {most:.2f} members"
+    return [replace(fault, kind="beyond", words=words)]
 
 
 def _figures_at_boundary(grid: Grid, boundary: Boundary, length: float) -> list[Figure]:

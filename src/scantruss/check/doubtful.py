@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 NODES_TURNED_OVER = 6  # nodes along a boundary in which turns are summed
 ZIGZAG_TURN = 130.0  # sum of the turns to either side among them from which on a boundary runs zigzag [degree]
 SMALL_HOLE = 12  # nodes around a hole up to which it may be none
-# share of a hole that must be filled by points that were left out for it to be none: a few strays in a courtyard, or a mast, fill less
+# share of a hole that must be filled by points that were left out for it to be none: a few outliers in a courtyard, or a mast, fill less
 FILLED_SHARE = 0.25
 # distance within which a point fills its surface, in that of the points around the hole from their sixth neighbours: of nine places in
 # ten one is as near

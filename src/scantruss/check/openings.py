@@ -39,14 +39,7 @@ def boundary_faults(grid: Grid, samples: SurfaceSamples, boundary: Boundary, len
 def boundary_overrun(grid: Grid, boundary: Boundary, length: float) -> list[Fault]:
     """Return a fault where a grid runs beyond the boundary of its scan over much of it, though nowhere as far as `boundary_beyond` refuses.
 
-    Parameters
-    ----------
-    grid : Grid
-        Of the same origin as the scan.
-    boundary : Boundary
-        Loops of the scan; those of limbs that are closed by caps are no boundary of the grid.
-    length : float
-        Desired member length where the grid has none of its own [scan unit].
+    Parameters as of `boundaries.places_aside`.
     """
     loops = [loop for loop in boundary.loops if loop.cut != "close"]
     chains = grid.boundary_loops

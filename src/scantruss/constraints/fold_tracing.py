@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -124,19 +125,19 @@ class Tracer:
 
     def trace(self) -> list[np.ndarray]:
         """The folds (K,) FOLD, a stride apart along each line of folds that is long and sharp enough to be a ridge."""
-        return self._trace_from(self._seeds(), [])
+        return self._trace_from(self._seeds, [])
 
     def trace_wide(self, narrow: list[np.ndarray]) -> list[np.ndarray]:
         """The same of folds that turn over nearly a member, away from the sharp ones of the lines that are known."""
         sharp = [folds for folds in narrow if is_sharp(folds, self.angle)]
-        seeds = self._seeds()
+        seeds = self._seeds
         places, away = self.surface.mean[seeds], np.ones(len(seeds), bool)
         for folds in sharp:
             away &= squares_between(places, folds).min(axis=1) > self.length**2
         self.wide = True
         found = self._trace_from(seeds[away], sharp)[len(sharp) :]
         self.wide = False
-        return [folds for folds in found if is_made(folds, self.angle)]
+        return [folds for folds in found if is_fillet(folds, self.angle)]
 
     def _trace_from(self, seeds: np.ndarray, known: list[np.ndarray]) -> list[np.ndarray]:
         """The lines of folds that are known, and those around samples (K,) that belong to none of them."""
@@ -188,6 +189,7 @@ class Tracer:
         moved: np.ndarray = places - smoothed(above)
         return moved
 
+    @cached_property
     def _seeds(self) -> np.ndarray:
         """Samples (K,) at which the normals turn so fast that there may be a ridge, the sharpest first."""
         bends = np.empty(len(self.surface.mean))
@@ -300,7 +302,7 @@ def runs_along(folds: np.ndarray, others: list[np.ndarray], length: float) -> bo
     return bool((nearest < length**2).mean() > 0.5)
 
 
-def is_made(folds: np.ndarray, angle: float) -> bool:
+def is_fillet(folds: np.ndarray, angle: float) -> bool:
     """Whether a line of wide folds (K,) FOLD turns by the ridge angle, between sides so even that it is a fillet."""
     return bool(np.median(folds["bend"]) >= angle and np.median(folds["gain"]) >= GAIN_OF_FILLET)
 

@@ -52,11 +52,10 @@ class FoldLines:
     def _joined(self, wide: list[np.ndarray]) -> tuple[Ridge, ...]:
         tracer, length = self._tracer, self.length
         sharp = [folds for folds in self.narrow if is_sharp(folds, tracer.angle)]
-        weak = [
-            folds for folds in self.narrow if not is_sharp(folds, tracer.angle)
-        ]  # pieces of a wide fold look like those
+        weak = [folds for folds in self.narrow if not is_sharp(folds, tracer.angle)]
+        # pieces of a wide fold look like weak ones
         traced = (
-            self.narrow if not wide else sharp + [folds for folds in weak if not runs_along(folds, wide, length)] + wide
+            [*sharp, *(folds for folds in weak if not runs_along(folds, wide, length)), *wide] if wide else self.narrow
         )
         lines = [Ridge(folds["place"], is_sharp(folds, tracer.angle)) for folds in traced]
         ridges = kept_ridges(join_ends(lines, length), length)
