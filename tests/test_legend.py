@@ -81,6 +81,15 @@ def test_every_warning_is_in_the_legend(views: tuple[str, ...], monkeypatch: pyt
     assert all(text.x + 0.62 * text.size * len(text.words) < wide[0] for text in texts if text.align == "left")
 
 
+def test_a_long_legend_says_the_faults_first_and_how_much_more_there_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    faults = tuple(Fault(f"k{k}", f"is wrong in way {k}") for k in range(12))
+    warnings = tuple(Fault(f"w{k}", f"is odd in way {k}", xyz(dome().nodes[k])) for k in range(18))
+    texts = texts_of(dome().replace(certificate=replace(NOTHING_FOUND, faults=faults, warnings=warnings)), monkeypatch)
+    said = [text.words for text in texts if text.align == "left" and len(text.words) > 1]
+    assert said[0] == "This grid fails its certificate:" and said[1:13] == [fault.words for fault in faults]
+    assert len(said) == picture.MOST_LEGEND_ROWS and said[-1] == f"and {1 + 30 - 19} more"
+
+
 def test_each_ring_has_the_number_of_its_warning(monkeypatch: pytest.MonkeyPatch) -> None:
     """Small ones too, and two at one place have numbers that do not lie on each other."""
     grid = dome()

@@ -95,6 +95,16 @@ def test_a_limb_cut_off_is_closed_by_a_cap_or_left_open_and_told(cut_thin: str) 
     assert len(on_ring) == 3, "a triangular tube ends in a triangle"
 
 
+def test_the_cap_of_a_limb_is_no_hole_and_no_opening_that_is_closed() -> None:
+    """It is said with the limb; of three nodes its triangle is too small to count, of a ring of more it is not."""
+    points = body(5.5, 4.4)
+    settings = st.Settings(length=1.0, effort="quick", limb_girth=4.8, allow_missing=0.3)
+    certificate = known(st.grid_from_points(points, settings).certificate)
+    assert "limbs" in {part.kind for part in certificate.left_out}
+    assert not {"hole", "gap"} & {part.kind for part in certificate.left_out}
+    assert "closed" not in {warning.kind for warning in certificate.warnings}
+
+
 @pytest.mark.parametrize(("cut_thin", "loops"), [("close", 0), ("open", 1)])
 def test_the_open_end_of_a_thin_leg_is_a_ring_and_no_hole(cut_thin: str, loops: int) -> None:
     """A front that ran over it as over a hole put a node far beyond it, where there is no scan."""

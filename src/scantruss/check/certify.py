@@ -25,7 +25,7 @@ from .folds import fold_angles
 from .gaps import bridged_gaps, openings_closed
 from .hanging import hanging_nodes, nodes_off_sheets
 from .irregular import count_irregular
-from .left_out import asked_for, closed_holes, first_and_more, parts_left_out
+from .left_out import asked_for, closed_holes, first_and_more, parts_left_out, without_caps
 from .limits import NOISES_OFF, ROUNDED_BY, limits_of, mostly_rounded, places_to_look_at, widened_limits
 from .openings import boundary_faults
 from .sheets import cut_apart, faults_on_sheets, nodes_of_samples
@@ -117,7 +117,7 @@ class Judged:
         rounded = _rounded(found, followed, members, roughness)
         places = places_to_look_at(self.certificate, missed_at, rounded)
         closed = asked_for(closed_holes(samples, boundary), settings.fill_at, length)
-        gaps = asked_for(gaps, settings.fill_at, length)
+        gaps = asked_for(without_caps(gaps, samples), settings.fill_at, length)
         slits, narrow, parts = narrow_gaps(grid, samples, feet, found, [*closed, *gaps], length)
         bridged = [each for each in bridged if each.kind == "bridged" or not each.is_said_by(parts)]
         holes = [*closed, *first_and_more([*(gap for gap in gaps if gap not in parts), *slits])]

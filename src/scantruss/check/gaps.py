@@ -131,15 +131,18 @@ def openings_closed(
     places, count = [hole.where for hole in wide if hole.where], sum(hole.number for hole in wide)
     more = f" ({count} such places)" if count > 1 else ""
     what = f"{words_of_number(wide[0].size or 0.0, 3)}{unit and ' ' + unit} across"
-    left = samples.scan[(samples.judged == ROD) | (samples.judged == LIMB)]
-    of_rods = all(
-        _has_points_within(left, np.array(hole.where) - samples.origin, hole.size) for hole in wide if hole.where
+    relative = [(np.array(hole.where) - samples.origin, hole.size) for hole in wide if hole.where]
+    left_out = ((ROD, "a column or the like was left out"), (LIMB, "a limb was cut off"))
+    why = next(
+        (
+            words
+            for judged, words in left_out
+            if all(_has_points_within(samples.scan[samples.judged == judged], *place) for place in relative)
+        ),
+        "",
     )
-    words = (
-        f"closes a place {what}, where a column or the like was left out{more}"
-        if of_rods
-        else f"closes an opening {what}{more}; shorter members leave it open"
-    )
+    words = f"closes a place {what}, where {why}{more}" if why else ""
+    words = words or f"closes an opening {what}{more}; shorter members leave it open"
     return [Fault("closed", words, places[0] if places else None, tuple(places[1:PLACES_KEPT]))]
 
 

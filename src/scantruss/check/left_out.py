@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 LIMBS_APART = 0.5  # gap between points of two limbs [member lengths]
 AROUND_HOLE = 0.25  # distance from a hole at which a place names it [member lengths]
+CAP_REACH = 1.2  # distance from the middle of a ring within which a place lies on its cap [largest radii of the ring]
 PLACES_LISTED = 5  # places of a kind that are listed one by one; the others are one entry without a place
 
 
@@ -169,6 +170,7 @@ def closed_holes(samples: SurfaceSamples, boundary: Boundary) -> list[LeftOut]:
     holes = [_hole(places, samples, asked=True) for places in filled]
     points = by_x(samples.measured_points) if boundary.bridged else samples.measured_points
     holes += [_hole(curve, samples, asked=False) for curve in boundary.bridged if is_empty_within(curve, points)]
+    holes = without_caps(holes, samples)
     return first_and_more(sorted(holes, key=lambda hole: -(hole.size or 0.0)))
 
 
@@ -192,6 +194,20 @@ def _closes_body(places: np.ndarray, samples: SurfaceSamples) -> bool:
     middle = places[((places - places.mean(axis=0)) ** 2).sum(axis=1).argmin()]
     near = np.linalg.norm(gone - middle, axis=1) < samples.surface.length
     return bool(near.any())
+
+
+def without_caps(holes: list[LeftOut], samples: SurfaceSamples) -> list[LeftOut]:
+    """Return holes and gaps but for the caps of limbs that were cut off at a ring, which are listed as such."""
+    caps = [
+        (middle := ring.points.mean(axis=0), np.linalg.norm(ring.points - middle, axis=1).max())
+        for ring in samples.rings
+    ]
+    return [
+        hole
+        for hole in holes
+        if hole.where is None
+        or not any(np.linalg.norm(hole.where - samples.origin - middle) <= CAP_REACH * reach for middle, reach in caps)
+    ]
 
 
 def first_and_more(parts: list[LeftOut]) -> list[LeftOut]:

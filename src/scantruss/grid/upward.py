@@ -19,6 +19,9 @@ LEAST_FACING = 0.08  # length of the mean normal by area above which it decides 
 FACE_DEPTH = 0.02  # how flat the face is on which something stands [longest side]
 FLAT_FACE = 0.1  # least share of such a face in the plan
 LOWER_FACE_WEIGHT = 3.0  # how much more a face counts that is below in a file with y or z up
+TALLER = 1.15  # how much longer the side of a body is along which it stands
+# thickness up to which a body lies flat, and one that is long in x, as an animal on its legs is [middle side]
+FLAT_BODY, FLAT_LONG_BODY = 0.5, 0.25
 POLYGON_DIRECTIONS = 64  # directions in which a convex polygon is sought
 
 
@@ -102,8 +105,10 @@ def _upward(facing: np.ndarray) -> np.ndarray:
 
 
 def _standing(extent: np.ndarray) -> np.ndarray:
-    """Return the axis along which something without a flat face stands."""
+    """Return the axis along which something without a flat face stands: y or z, as hardly a file has x up."""
     short, middle, long = np.argsort(extent, kind="stable")
-    if extent[long] > 1.15 * extent[middle]:
+    if long != 0 and extent[long] > TALLER * extent[middle]:
         return np.eye(3)[long]
-    return np.eye(3)[short] if extent[short] < 0.5 * extent[middle] else np.eye(3)[1]
+    if short != 0 and extent[short] < (FLAT_BODY if long != 0 else FLAT_LONG_BODY) * extent[middle]:
+        return np.eye(3)[short]
+    return np.eye(3)[2 if extent[2] > TALLER * extent[1] else 1]

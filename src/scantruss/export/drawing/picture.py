@@ -56,6 +56,7 @@ if TYPE_CHECKING:
     from PIL.Image import Image
 
 PICTURE_SIZE = (1600, 1200)  #: of a picture [pixel]
+MOST_LEGEND_ROWS = 20  # rows of the legend of a picture, so that it leaves room for the grid
 PANELS_SIZE = (2400, 800)  #: of three panels, or of several views [pixel]
 
 
@@ -130,7 +131,11 @@ def _legend_rows(grid: Grid, cloud: PointCloud | None, shown: Shown | None) -> l
         numbers = [str(number) for number, mark in enumerate(places_marked(grid), 1) if mark.kind == part.kind]
         rows.append(Row(f"{part.words}{', at ' if numbers else ''}{', '.join(numbers)}", "\u25cf", part.colour))
     rows += [Row(words) for words in (shown.unread if shown else ())]
-    return [*rows, *rows_of_marks(grid), *(Row(words) for words in picture_notes(grid, cloud))]
+    rows = [*rows, *rows_of_marks(grid)]
+    if len(rows) > MOST_LEGEND_ROWS:  # the terminal and the report have them all
+        rows.sort(key=lambda row: row.colour is not FAULT_COLOUR)
+        rows = [*rows[: MOST_LEGEND_ROWS - 1], Row(f"and {len(rows) - MOST_LEGEND_ROWS + 1} more", "+")]
+    return [*rows, *(Row(words) for words in picture_notes(grid, cloud))]
 
 
 def encode_cloud(cloud: PointCloud) -> bytes:
