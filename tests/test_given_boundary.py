@@ -15,7 +15,7 @@ from typed import known
 import scantruss as st
 from scantruss import Settings, grid_from_points
 from scantruss.cli.main import main
-from scantruss.errors import LengthError
+from scantruss.errors import InputError, LengthError
 from scantruss.export.json import encode_json
 
 Curve = tuple[tuple[float, float, float], ...]
@@ -123,6 +123,28 @@ def test_the_grid_reaches_a_boundary_that_leaves_the_scan_by_less_than_half_a_me
         match=r"boundary 1 leaves the scan by up to 0\.\d+, near \(-5\.8, .*half a member, 0\.5: move it, or add points",
     ):
         grid_from_points(plate(), Settings(length=1.0, boundary=(too_far,)))
+
+
+def test_a_boundary_in_another_unit_is_refused_at_once_with_its_factor() -> None:
+    in_mm = [(1000.0 * x, 1000.0 * y, 1000.0 * z) for x, y, z in ring(*CORNERS)]
+    with pytest.raises(
+        InputError, match=r"boundary 1, point 1 .* away from the scan; .*times 0\.001 all that are given"
+    ):
+        grid_from_points(plate(), Settings(length=1.0, boundary=(in_mm,)))
+
+
+def test_an_open_polyline_is_refused_where_its_ends_do_not_meet_on_the_scan() -> None:
+    """No other length is tried for it: an `InputError` that is no `LengthError`."""
+    points = plate()
+    points = points[np.hypot(*points[:, :2].T) > 3.0]
+    angle = np.linspace(0.0, 1.2 * np.pi, 60)
+    x, y = 4.0 * np.cos(angle), 4.0 * np.sin(angle)
+    arc = np.stack([x, y, height(x, y)], axis=1)
+    with pytest.raises(
+        InputError, match="boundary 1 leaves the scan, where a straight line closes it, by up to"
+    ) as refused:
+        grid_from_points(points, Settings(length=1.0, boundary=(arc.tolist(),)))
+    assert not isinstance(refused.value, LengthError)
 
 
 def test_inside_is_where_the_rim_of_the_scan_is_not_and_on_a_closed_scan_the_larger_part() -> None:

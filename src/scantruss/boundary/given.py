@@ -14,6 +14,7 @@ from ..kernels.geometry.components import component_labels
 from ..kernels.scan.nearby import nearest_places
 from ..kernels.surface.samples import put_all
 from ..surface.chosen_samples import KEPT
+from ..surface.near_scan import check_on_scan
 from ..surface.owners import owners_of
 from ..surface.samples import narrow_surface, samples_with
 from .corners import CURVE_STEP
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 
 OUTSIDE_BOUNDARY = "outside of the boundary that was given"
 BRIDGED_DISTANCE = 0.5  # distance up to which the boundary may leave the scan; the grid bridges it [member lengths]
+FAR_BOUNDARY = 1.0  # distance from which on no usual length bridges it [member lengths]
 SHORTEST_BOUNDARY = 3.0  # shortest boundary [member lengths]
 CORNERS_APART = 0.5  # of two corners nearer along the boundary the sharper one is a node [member lengths]
 # a boundary of the scan that comes no farther than this from that given is the same [member lengths]
@@ -136,8 +138,8 @@ def _curve(
 
     Raises
     ------
-    LengthError
-        It is too short for the member, or leaves the scan by more than half of one.
+    InputError
+        It is too short for the member, or leaves the scan by more than half of one; `LengthError` where another length may do.
     """
     length, unit = settings.length, f" {samples.unit}" if samples.unit else ""
     given = np.array(ring, float) - samples.origin
@@ -146,12 +148,16 @@ def _curve(
             f"boundary {number} is {words_of_number(around, 4)}{unit} long; three members,"
             f" {words_of_number(SHORTEST_BOUNDARY * length, 4)}{unit}, are needed"
         )
+    check_on_scan(f"boundary {number}", ring, samples, length, FAR_BOUNDARY)
     points, vertices = divide_polyline(np.concatenate([given, given[:1]]), True, CURVE_STEP * length)
     _, gaps = feet_on_scan(points, narrow_surface(samples, POINTS_UNDER_LINE))
     if (worst := float(gaps.max())) > BRIDGED_DISTANCE * length:
-        place = words_of_place(points[int(gaps.argmax())] + samples.origin)
-        raise LengthError(
-            f"boundary {number} leaves the scan by up to {words_of_number(worst, 4)}{unit}, near ({place});"
+        at = int(gaps.argmax())
+        place = words_of_place(points[at] + samples.origin)
+        way = ", where a straight line closes it," if at > vertices[-1] else ""
+        refused = LengthError if worst <= FAR_BOUNDARY * length else InputError  # longer members may bridge it
+        raise refused(
+            f"boundary {number} leaves the scan{way} by up to {words_of_number(worst, 4)}{unit}, near ({place});"
             f" it must stay within half a member, {words_of_number(BRIDGED_DISTANCE * length, 4)}{unit}: move it, or add points"
         )
     return points, _apart(points, corners_of_polyline(points, vertices, True, settings), CORNERS_APART * length)

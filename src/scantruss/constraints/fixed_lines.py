@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,8 +9,8 @@ import numpy as np
 from ..boundary.polylines import POINTS_UNDER_LINE, corners_of_polyline, divide_polyline, feet_on_scan, simplify
 from ..errors import InputError, unit_words, words_of_number
 from ..kernels.surface.local_surface import Surface
-from ..surface.samples import SurfaceSamples, distance_from_scan, narrow_surface
-from .fixed_nodes import nearest_words, place_text
+from ..surface.near_scan import check_on_scan, place_text
+from ..surface.samples import SurfaceSamples, narrow_surface
 
 if TYPE_CHECKING:
     from ..settings import Settings
@@ -36,7 +35,7 @@ def add_polylines(network: Network, samples: SurfaceSamples, settings: Settings)
     for number, line in enumerate(settings.fixed_lines, 1):
         name = settings.line_names[number - 1] if settings.line_names else f"line {number}"
         given = np.array(line, float) - samples.origin
-        _check_on_scan(given, line, number, samples, settings.length)
+        check_on_scan(f"fixed line {number}", line, samples, settings.length)
         closed = bool((given[0] == given[-1]).all())
         _check_length(given, closed, number, samples.unit, settings.length)
         points, vertices = divide_polyline(
@@ -46,21 +45,6 @@ def add_polylines(network: Network, samples: SurfaceSamples, settings: Settings)
         points = _onto_scan(points, number, samples, patches, settings.length)
         for part, own, ring in _without_returns(points, corners, closed, settings.length):
             network.add(part, ring, own, name=name)
-
-
-def _check_on_scan(
-    given: np.ndarray, line: Sequence[Sequence[float]], number: int, samples: SurfaceSamples, length: float
-) -> None:
-    """Refuse a line with a point farther than half a member from the scan."""
-    unit = unit_words(samples.unit)
-    for k, place in enumerate(given):
-        distance = distance_from_scan(samples.surface, place)
-        if distance > 0.5 * length:
-            raise InputError(
-                f"fixed line {number}, point {k + 1} {place_text(line[k])} is {words_of_number(distance, 4)}{unit} away from the scan;"
-                f" it must lie within half a member, {0.5 * length:.4g}{unit};"
-                f" {nearest_words(np.array(line, float), place, samples, length)}"
-            )
 
 
 def _check_length(given: np.ndarray, closed: bool, number: int, unit: str, length: float) -> None:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..constraints.fixed_nodes import place_text
 from ..errors import InputError
 from ..kernels.boundary.curves import nearest_on_curves
 from ..kernels.mesh.grid import AT_REST, ON_CURVE, Net, may_split, split
 from ..kernels.mesh.point_location import nearest_sample
 from ..kernels.mesh.trial import Scratch
+from ..surface.near_scan import place_text
 from ..surface.samples import local_field
 from .equalize import FARTHEST_ON_THE_WAY, LENGTH_WEIGHT, energy_of_grid, new_scratch, search_once, settle
 from .working_mesh import WorkingMesh
