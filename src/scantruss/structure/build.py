@@ -53,9 +53,42 @@ def truss_of_grid(
         raise InputError(f"the grid is in {grid.unit}, not in {unit}; leave --unit out")
     metres = scale_of(grid.unit or unit, scale)
     layered = double_layer != ""
-    pinned, spring = _joints(joints or ("pinned" if layered else "rigid"))
     if held_layer not in HELD_LAYERS:
         raise InputError(f"the held layer must be {' or '.join(HELD_LAYERS)}, got {held_layer!r}")
+    truss = _one_layer(
+        grid,
+        metres,
+        find_section(section) if isinstance(section, str) else section,
+        find_material(material) if isinstance(material, str) else material,
+        joints or ("pinned" if layered else "rigid"),
+    ).replace(scale=float(scale))
+    held = support_nodes(truss, supports)
+    if layered and isinstance(grid, Framework):
+        raise InputError(
+            "a double layer is made of panels, and some members of the grid are on none; leave it out, or take them out"
+        )
+    if layered:
+        outer = grid.replace(
+            nodes=truss.nodes, triangles=truss.triangles, panels=truss.panels, origin=truss.origin, unit="m"
+        )
+        layers = make_double_layer(
+            outer, _depths(double_layer), second=second_layer, along=depth_along, edges=layer_edges, bends=sharp_bends
+        )
+        truss = _with_layers(truss, layers)
+        held = layers.under[held] if held_layer == "inner" else held
+    truss = truss.replace(supports=support_stiffness(len(truss.nodes), held, support_type))
+    cases = cases_of(truss, loads, node_allowance)
+    return truss.replace(
+        cases=cases, combinations=usual_combinations(cases) if combinations is None else tuple(combinations)
+    )
+
+
+def _one_layer(grid: Grid, metres: float, section: Section, material: Material, joints: str | float) -> Truss:
+    """Return the structure of a grid without supports and loads, its panels turned to what loads it from above.
+
+    metres : in one unit of the grid
+    """
+    pinned, spring = _joints(joints)
     nodes = np.ascontiguousarray(grid.nodes, float) * metres
     members, triangles = np.asarray(grid.edges, np.int64), np.asarray(grid.triangles, np.int64)
     if len(members) == 0:
@@ -71,16 +104,16 @@ def truss_of_grid(
     for corner in panels.T:
         np.add.at(node_normals, corner[corner >= 0], normals_of_panels[corner >= 0])
     of_triangle = slice(None) if grid.panels is None else panel_of_triangles(panels)
-    truss = Truss(
+    return Truss(
         nodes=nodes,
         members=members,
         triangles=triangles,
         panels=None if grid.panels is None else panels,
         node_normals=units(node_normals),
         member_normals=units(_at_members(grid, units(normals_of_panels)[of_triangle])),
-        sections=(find_section(section) if isinstance(section, str) else section,),
+        sections=(section,),
         section_of=np.zeros(len(members), np.int64),
-        material=find_material(material) if isinstance(material, str) else material,
+        material=material,
         supports=np.zeros((len(nodes), 6)),
         end_stiffness=np.full((len(members), 2, 2), spring),
         pinned=pinned,
@@ -89,25 +122,7 @@ def truss_of_grid(
         system=grid.system if metres == 1.0 else "",  # at a scale, or in feet, the coordinates are no longer those
         node_marks=tuple(node_marks(grid)),
         member_marks=tuple(marks),
-        scale=float(scale),
         alike=None if grid.alike is None else replace(grid.alike, member=grid.alike.member * metres),
-    )
-    held = support_nodes(truss, supports)
-    if layered and isinstance(grid, Framework):
-        raise InputError(
-            "a double layer is made of panels, and some members of the grid are on none; leave it out, or take them out"
-        )
-    if layered:
-        outer = grid.replace(nodes=nodes, triangles=triangles, panels=truss.panels, origin=truss.origin, unit="m")
-        layers = make_double_layer(
-            outer, _depths(double_layer), second=second_layer, along=depth_along, edges=layer_edges, bends=sharp_bends
-        )
-        truss = _with_layers(truss, layers)
-        held = layers.under[held] if held_layer == "inner" else held
-    truss = truss.replace(supports=support_stiffness(len(truss.nodes), held, support_type))
-    cases = cases_of(truss, loads, node_allowance)
-    return truss.replace(
-        cases=cases, combinations=usual_combinations(cases) if combinations is None else tuple(combinations)
     )
 
 

@@ -12,7 +12,6 @@ from .colouring import BY_LENGTH, PLAIN_GRID, DrawnDesign, SharedScale, choices_
 from .colours import BRUSHED, DIMMED_COLOUR, histogram_of
 from .drawn_lines import numbers_of
 from .frame import SectionPlane
-from .legend import ColourLegend
 from .pictures import PictureTool
 from .scale import round_ends, set_scale
 from .scene import (
@@ -33,6 +32,7 @@ from .scene import (
 )
 
 if TYPE_CHECKING:
+    from ..export.model import Model
     from .state import StudioState
     from .view import StudioView
 
@@ -166,69 +166,87 @@ class GridTab:
             return
         model, _ = shown
         places = self.view.places(model)
-        legend: ColourLegend | None = None
+        colors = self._colors(len(model.members))
+        size = float(np.linalg.norm(np.diff(places[model.members], axis=1), axis=2).mean())
+        kept = np.ones(len(places), bool) if self.section is None else self.section.keeps(places)
+        self._draw_members(model, places, colors["members"], size, for_picture)
+        self._draw_nodes(places, kept, colors["nodes"], size)
+        self._draw_panels(model, places, kept, colors["panels"])
+        self.view.compare.draw()
+
+    def _colors(self, members: int) -> dict[str, np.ndarray | None]:
+        """Return the colours of members, nodes and panels, None where they are plain, and say in the tab what they mean."""
         colors: dict[str, np.ndarray | None] = {"members": None, "nodes": None, "panels": None}
-        is_reference = self.view.compare.is_by_distance
+        is_reference, is_over = self.view.compare.is_by_distance, self.view.compare.is_over
+        is_moved, legend = self.view.structure.is_moved, None
         if (scale := self.scale) is not None:
             values, kind = scale.of_designs[0], scale.choice["kind"]
             legend, selected = scale.legend(), self.selected(values)
             self.legend.content = legend.html()
             chosen = None if selected is None else self.range.value
             self.bars.content = histogram_of(values, *scale.ends, scale.colors, chosen)
-            if not (is_reference or self.view.compare.is_over):
+            if not (is_reference or is_over):
                 colors[kind] = drawn_colors(scale.colors(values), selected)
             said = "" if selected is None else f"{int(selected.sum()):,} of "
             self.count.content = f"{said}{len(values):,} {kind}"
-        section, size = self.section, float(np.linalg.norm(np.diff(places[model.members], axis=1), axis=2).mean())
-        of_members = plain_colors(len(model.members)) if colors["members"] is None else colors["members"]
-        is_faint = self.view.structure.is_moved or self.view.compare.is_over
-        self.view.legends.show("grid", None if is_faint or is_reference else legend)
-        if self.view.structure.is_moved:
-            of_members = np.broadcast_to(DIMMED_COLOUR, of_members.shape)
+        self.view.legends.show("grid", None if is_moved or is_over or is_reference else legend)
+        if is_moved:
             self.count.content = "grey as built, while the Structure tab shows a displaced shape"
-        elif self.view.compare.is_over:
-            of_members = np.broadcast_to(DIMMED_COLOUR, of_members.shape)
+        elif is_over:
             self.count.content = "grey, while Compare draws another design over it"
         elif is_reference:
             self.count.content = "plain, while Compare colours another design by its distance from this one"
-        ends, of_members = cut(section, places[model.members], of_members)
+        if is_moved or is_over:
+            colors["members"] = np.broadcast_to(DIMMED_COLOUR, (members, 3))
+        return colors
+
+    def _draw_members(
+        self, model: Model, places: np.ndarray, colors: np.ndarray | None, size: float, for_picture: bool
+    ) -> None:
+        """Draw the members (M,) as lines, rods or tubes; places : (V, 3), colors : (M, 3), size : mean length of a member."""
+        of_members = plain_colors(len(model.members)) if colors is None else colors
+        ends, of_members = cut(self.section, places[model.members], of_members)
         lines, bodies = self.members.value and not self.tubes.value, self.members.value and self.tubes.value
         as_rods = lines and not for_picture and drawn_as_rods(model, len(ends))
         lines = lines and not as_rods
-        scene.members(
+        is_faint = self.view.structure.is_moved or self.view.compare.is_over
+        self.view.scene.members(
             "/grid/members", ends if lines else ends[:0], of_members if lines else of_members[:0],
             FAINT_LINE if is_faint else LINE_WIDTH, None if for_picture else MOST_DRAWN_LINES,
         )  # fmt: skip
         radius, sides = (ROD_RADIUS, ROD_SIDES) if as_rods else (TUBE_RADIUS, TUBE_SIDES)
         in_space = bodies or as_rods
-        scene.tubes(
+        self.view.scene.tubes(
             "/grid/tubes",
             ends if in_space else ends[:0],
             of_members if in_space else of_members[:0],
             radius * size,
             sides,
         )
-        kept = np.ones(len(places), bool) if section is None else section.keeps(places)
-        drawn = (
-            kept if self.nodes.value or self.tubes.value or colors["nodes"] is not None else np.zeros(len(places), bool)
-        )
-        of_nodes = plain_colors(len(places)) if colors["nodes"] is None else colors["nodes"]
-        as_balls = drawn if self.tubes.value and colors["nodes"] is None else drawn & False
+
+    def _draw_nodes(self, places: np.ndarray, kept: np.ndarray, colors: np.ndarray | None, size: float) -> None:
+        """Draw the nodes (V, 3) that the section keeps (V,), as balls, or as points in the colours (V, 3) of the legend."""
+        wanted = self.nodes.value or self.tubes.value or colors is not None
+        drawn = kept if wanted else np.zeros(len(places), bool)
+        of_nodes = plain_colors(len(places)) if colors is None else colors
+        as_balls = drawn if self.tubes.value and colors is None else drawn & False
         as_points = drawn & ~as_balls  # their colours are those of the legend, without shade
-        scene.balls("/grid/balls", places[as_balls], of_nodes[as_balls], BALL_RADIUS * size)
-        scene.points("/grid/nodes", places[as_points], np.ascontiguousarray(of_nodes[as_points]), 0.2 * size)
-        panels, of_panels = model.panels, colors["panels"]
+        self.view.scene.balls("/grid/balls", places[as_balls], of_nodes[as_balls], BALL_RADIUS * size)
+        self.view.scene.points("/grid/nodes", places[as_points], np.ascontiguousarray(of_nodes[as_points]), 0.2 * size)
+
+    def _draw_panels(self, model: Model, places: np.ndarray, kept: np.ndarray, colors: np.ndarray | None) -> None:
+        """Draw the panels whose nodes the section keeps (V,), in colours (P, 3)."""
+        panels = model.panels
         visible = (kept[panels] | (panels < 0)).all(axis=1)
-        visible &= (self.panels.value or of_panels is not None) and not self.view.structure.is_moved
-        scene.panels(
+        visible &= (self.panels.value or colors is not None) and not self.view.structure.is_moved
+        self.view.scene.panels(
             "/grid/panels",
             places,
             model.triangles[visible[panel_of_triangles(panels)]],
-            None if of_panels is None else of_panels[visible],
+            None if colors is None else colors[visible],
             0.35 if len(model.members) <= MOST_DRAWN_LINES or is_layered(model) else None,
             panels[visible],
         )
-        self.view.compare.draw()
 
     # ---- theme
 

@@ -13,7 +13,7 @@ import numpy as np
 from ...grid.upward import AGAINST_GRAVITY
 from ...runtime.ours import MADE_BY
 from ...structure.truss import Truss
-from .camera import choose_camera
+from .camera import Camera, choose_camera
 from .strokes import INK_COLOUR, PAPER_COLOUR, look
 
 FORCES, USED, MOVED, SIZES = "forces", "utilization", "displacements", "sizes"  #: scales of colours
@@ -126,7 +126,6 @@ def webp_of(figure: Any) -> bytes:
 def draw_members(figure: Any, place: tuple[float, float, float, float], truss: Truss, shown: MemberPicture) -> None:
     """Draw a picture and its colour bar into a part of a figure (left, bottom, width, height)."""
     from matplotlib.cm import ScalarMappable
-    from matplotlib.collections import PolyCollection
     from matplotlib.colors import LinearSegmentedColormap
 
     left, bottom, width, height = place
@@ -143,6 +142,34 @@ def draw_members(figure: Any, place: tuple[float, float, float, float], truss: T
     mappable = ScalarMappable(
         _scale(shown), colours.with_extremes(over=OVERUSED_COLOUR) if shown.colours == USED else colours
     )
+    axes.add_collection(_members_and_shell(truss, nodes, shown, camera, mappable), autolim=False)
+    mark = float(np.clip(0.2 * camera.zoom * np.median(truss.lengths), 1.5, 4.5))
+    held = np.flatnonzero(truss.supports.any(axis=1))
+    axes.plot(
+        *camera.project(nodes[held])[0].T,
+        "^",
+        markersize=mark,
+        markerfacecolor="white",
+        markeredgecolor=tuple(INK_COLOUR),
+        markeredgewidth=0.9,
+    )
+    _add_colour_bar(figure, (left + width * 0.9, bottom + height * 0.14, width * 0.018, height * 0.72), shown, mappable)
+    axes.text(margin, 4, "\u25b3 support" if len(held) else "", fontsize=8, color=tuple(INK_COLOUR), va="bottom")
+    if shown.factor != 1.0 and shown.moves is not None:
+        axes.text(
+            0.15 * size[0],
+            4,
+            f"displacements drawn {shown.factor:g} times",
+            fontsize=8,
+            color=tuple(INK_COLOUR),
+            va="bottom",
+        )
+
+
+def _members_and_shell(truss: Truss, nodes: np.ndarray, shown: MemberPicture, camera: Camera, mappable: Any) -> Any:
+    """Return members, shell and unmoved members as one collection in the order of painting; nodes : (V, 3) as they are shown."""
+    from matplotlib.collections import PolyCollection
+
     flat, near = camera.project(nodes)
     shell = len(truss.triangles) > 0 and not truss.member_sets  # it would hide the second layer
     view = look(nodes, truss.triangles, camera, (0, 0), mapped=False) if shell else None
@@ -169,37 +196,19 @@ def draw_members(figure: Any, place: tuple[float, float, float, float], truss: T
         parts.append((behind[truss.members].mean(axis=1), lines, np.zeros((len(lines), 4)), colour, 0.4 * width_of))
     order = np.argsort(np.concatenate([part[0] for part in parts]), kind="stable")
     shape, fill, line, widths = (cast(Any, np.concatenate([part[k] for part in parts])[order]) for k in range(1, 5))
-    axes.add_collection(
-        PolyCollection(shape, closed=False, facecolors=fill, edgecolors=line, linewidths=0.72 * widths,
-                       capstyle="round", joinstyle="round", antialiaseds=True, rasterized=len(shape) > MOST_VECTORS), autolim=False,
-    )  # fmt: skip
-    mark = float(np.clip(0.2 * camera.zoom * np.median(truss.lengths), 1.5, 4.5))
-    held = np.flatnonzero(truss.supports.any(axis=1))
-    axes.plot(
-        *flat[held].T,
-        "^",
-        markersize=mark,
-        markerfacecolor="white",
-        markeredgecolor=tuple(INK_COLOUR),
-        markeredgewidth=0.9,
-    )
-    bar = figure.add_axes((left + width * 0.9, bottom + height * 0.14, width * 0.018, height * 0.72))
+    return PolyCollection(shape, closed=False, facecolors=fill, edgecolors=line, linewidths=0.72 * widths,
+                          capstyle="round", joinstyle="round", antialiaseds=True, rasterized=len(shape) > MOST_VECTORS)  # fmt: skip
+
+
+def _add_colour_bar(figure: Any, box: tuple[float, float, float, float], shown: MemberPicture, mappable: Any) -> None:
+    """Add what the colours of a picture mean into a part of a figure."""
+    bar = figure.add_axes(box)
     made = figure.colorbar(
         mappable, cax=bar, extend="max" if shown.colours == USED and shown.values.max() > 1 else "neither"
     )
     made.set_label(shown.label, fontsize=9, color=tuple(INK_COLOUR))
     made.outline.set_linewidth(0.5)
     bar.tick_params(labelsize=8, colors=tuple(INK_COLOUR), width=0.5)
-    axes.text(margin, 4, "\u25b3 support" if len(held) else "", fontsize=8, color=tuple(INK_COLOUR), va="bottom")
-    if shown.factor != 1.0 and shown.moves is not None:
-        axes.text(
-            0.15 * size[0],
-            4,
-            f"displacements drawn {shown.factor:g} times",
-            fontsize=8,
-            color=tuple(INK_COLOUR),
-            va="bottom",
-        )
 
 
 def _scale(shown: MemberPicture) -> Any:

@@ -72,6 +72,46 @@ def energy_of(net: QuadNet, quads: np.ndarray, share: np.ndarray, lengths: float
 
 
 @kernel
+def _quads_after(net: QuadNet, ids: np.ndarray, changed: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    """Return the quads (R, 4) that stand for some (N,) where others replace a part of them; parameters as of `try_quads`."""
+    after, row = np.empty((len(ids) + len(changed), 4), np.int64), 0
+    for i in range(len(ids)):
+        other = -1
+        for k in range(len(changed)):
+            if changed[k] == ids[i]:
+                other = k
+        if other < 0:
+            after[row] = net.quads[ids[i]]
+            row += 1
+        elif corners[other, 0] >= 0:
+            after[row] = corners[other]
+            row += 1
+    for k in range(len(changed)):
+        if net.quads[changed[k], 0] < 0 and corners[k, 0] >= 0:
+            after[row] = corners[k]
+            row += 1
+    return after[:row]
+
+
+@kernel
+def _keep_nodes(net: QuadNet, quads: np.ndarray, places: np.ndarray, old: np.ndarray) -> int:
+    """Keep which nodes some quads (N, 4) have, and where they are; return how many. Parameters as of `try_quads`."""
+    net.clock[0] += 1
+    around = 0
+    for i in range(4 * len(quads)):
+        v = quads[i // 4, i % 4]
+        if net.stamp[v] != net.clock[0]:
+            net.stamp[v] = net.clock[0]
+            places[around] = v
+            around += 1
+    put_in_order(places[:around])
+    for i in range(around):
+        v = places[i]
+        old[i, 0], old[i, 1], old[i, 2], old[i, 3] = net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2], net.arc[v]
+    return around
+
+
+@kernel
 def try_quads(
     net: QuadNet,
     touched: np.ndarray,
@@ -108,37 +148,10 @@ def try_quads(
     count = quads_around(net, touched, ids)
     if count < 0:
         return np.inf, 0
-    before, after, row = np.empty((count, 4), np.int64), np.empty((count + len(changed), 4), np.int64), 0
-    for i in range(count):
-        q = ids[i]
-        before[i] = net.quads[q]
-        other = -1
-        for k in range(len(changed)):
-            if changed[k] == q:
-                other = k
-        if other < 0:
-            after[row] = net.quads[q]
-            row += 1
-        elif corners[other, 0] >= 0:
-            after[row] = corners[other]
-            row += 1
-    for k in range(len(changed)):
-        if net.quads[changed[k], 0] < 0 and corners[k, 0] >= 0:
-            after[row] = corners[k]
-            row += 1
-    after = after[:row]
-    net.clock[0] += 1
-    around = 0
-    for i in range(4 * count):
-        v = before[i // 4, i % 4]
-        if net.stamp[v] != net.clock[0]:
-            net.stamp[v] = net.clock[0]
-            places[around] = v
-            around += 1
-    put_in_order(places[:around])
-    for i in range(around):
-        v = places[i]
-        old[i, 0], old[i, 1], old[i, 2], old[i, 3] = net.nodes[v, 0], net.nodes[v, 1], net.nodes[v, 2], net.arc[v]
+    before = net.quads[ids[:count]]
+    after = _quads_after(net, ids[:count], changed, corners)
+    row = len(after)
+    around = _keep_nodes(net, before, places, old)
     share = np.empty((count, 4))
     shares_of(before, at_boundary, share)
     energy = energy_of(net, before, share, lengths, angles)
