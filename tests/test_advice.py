@@ -309,6 +309,25 @@ def test_of_lengths_that_lose_about_as_much_the_usual_one_is_suggested(monkeypat
     assert advice.suggest() < advice._usual
 
 
+@pytest.mark.parametrize("kind", ["closed", "gap"])
+def test_a_length_that_closes_openings_gives_way_to_the_next_below_that_leaves_them_open(
+    kind: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def tried(advice: Advice, length: float, most: int = 0) -> LengthTrial:
+        warnings = (SimpleNamespace(kind=kind),) if length > closes_from * advice._usual else ()
+        found = SimpleNamespace(judged_out=lost if length < advice._usual else 0.0, warnings=warnings)
+        return LengthTrial(length, cast(Any, SimpleNamespace(certificate=found)))
+
+    monkeypatch.setattr(Advice, "try_length", tried)
+    advice = Advice(cloud_of("limpet"), st.Settings(length=1.0))
+    closes_from, lost = 0.9, 0.0
+    assert advice.suggest() == advice.next_below(advice._usual)
+    lost = 0.005  # of the scan, which the usual one does not
+    assert advice.suggest() == advice._usual
+    closes_from, lost = 0.1, 0.0  # then so does the shorter one
+    assert advice.suggest() == advice._usual
+
+
 def test_info_says_which_lengths_pass_and_why_others_do_not(
     place: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -200,7 +200,8 @@ class Advice:
         It is the first of those tried in turn that passes with what is next above it, both without much of the scan lost; else of
         those that pass with what is next above them the first that loses hardly more than the least; else the next below one that
         passes, if it passes too; else one that passes, if there is one with another not far above it that passes too; else the usual
-        length. Where none passes, longer ones are looked at once more, then those beside the usual one.
+        length. Where none passes, longer ones are looked at once more, then those beside the usual one. One that closes openings gives
+        way to the next below it, if that passes, closes none and loses no more.
         """
         self.is_spent = True
         low, high = length_range(self._cloud)
@@ -218,7 +219,7 @@ class Advice:
             if above is not None and above.passed:
                 both[length] = max(trial.lost, above.lost)
                 if both[length] <= MOST_LOST:
-                    return length
+                    return self._leaving_open(trial)
         if both:
             least = min(both.values())
             return next(length for length, lost in both.items() if lost <= least + LOST_ALIKE)
@@ -235,6 +236,14 @@ class Advice:
                 return below
         followed = [one for one in passing if any(one < other <= NEARLY_NEXT * one for other in passing)]
         return min(followed or passing, key=self._far_from_usual, default=self._usual)
+
+    def _leaving_open(self, trial: LengthTrial) -> float:
+        """Return the length of a trial that passes, or the next below it if that leaves open what this one closes, and loses no more."""
+        below = self.next_below(trial.length)
+        shorter = self.try_length(below, A_FEW) if trial.closes_openings and below < trial.length else None
+        if shorter is None or not shorter.passed or shorter.closes_openings:
+            return trial.length
+        return below if shorter.lost <= trial.lost + LOST_ALIKE else trial.length
 
     def _try_longer(self) -> None:
         """Try longer lengths than the usual one until one passes, with the grids of the table: columns are then seen for what they are.

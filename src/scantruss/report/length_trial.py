@@ -9,6 +9,8 @@ if TYPE_CHECKING:
     from ..errors import FrontError
     from ..grid.grid import Grid
 
+CLOSING = ("closed", "gap")  # kinds of warnings of what a grid covers that is open in the scan
+
 
 @dataclass(frozen=True, eq=False)
 class LengthTrial:
@@ -43,3 +45,9 @@ class LengthTrial:
         if self.grid is None or self.grid.certificate is None:
             return 1.0
         return self.grid.certificate.judged_out
+
+    @property
+    def closes_openings(self) -> bool:
+        """Whether the grid closes openings or gaps of the scan that nobody asked to be closed."""
+        found = self.grid.certificate if self.grid is not None else None
+        return found is not None and any(warning.kind in CLOSING for warning in found.warnings)
