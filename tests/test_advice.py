@@ -309,13 +309,14 @@ def test_of_lengths_that_lose_about_as_much_the_usual_one_is_suggested(monkeypat
     assert advice.suggest() < advice._usual
 
 
-@pytest.mark.parametrize("kind", ["closed", "gap"])
+@pytest.mark.parametrize("kind", ["hole", "gap"])
 def test_a_length_that_closes_openings_gives_way_to_the_next_below_that_leaves_them_open(
     kind: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def tried(advice: Advice, length: float, most: int = 0) -> LengthTrial:
-        warnings = (SimpleNamespace(kind=kind),) if length > closes_from * advice._usual else ()
-        found = SimpleNamespace(judged_out=lost if length < advice._usual else 0.0, warnings=warnings)
+        size = (1.2 if length > closes_from * advice._usual else 0.9) * length
+        part = SimpleNamespace(kind=kind, asked=False, size=size)
+        found = SimpleNamespace(judged_out=lost if length < advice._usual else 0.0, left_out=(part,))
         return LengthTrial(length, cast(Any, SimpleNamespace(certificate=found)))
 
     monkeypatch.setattr(Advice, "try_length", tried)

@@ -9,8 +9,6 @@ if TYPE_CHECKING:
     from ..errors import FrontError
     from ..grid.grid import Grid
 
-CLOSING = ("closed", "gap")  # kinds of warnings of what a grid covers that is open in the scan
-
 
 @dataclass(frozen=True, eq=False)
 class LengthTrial:
@@ -48,6 +46,9 @@ class LengthTrial:
 
     @property
     def closes_openings(self) -> bool:
-        """Whether the grid closes openings or gaps of the scan that nobody asked to be closed."""
+        """Whether the grid closes openings or gaps of the scan longer than a member that nobody asked to be closed."""
         found = self.grid.certificate if self.grid is not None else None
-        return found is not None and any(warning.kind in CLOSING for warning in found.warnings)
+        return found is not None and any(
+            part.kind in ("hole", "gap") and not part.asked and (part.size or 0.0) > self.length
+            for part in found.left_out
+        )
