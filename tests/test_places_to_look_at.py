@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -180,6 +182,9 @@ def test_teeth_are_a_zigzag_and_straight_sides_corners_and_a_step_are_none() -> 
     teeth = grid.replace(triangles=grid.triangles[(number % 2 == 0) | (y < y.max() - 0.7)])
     found = zigzags(teeth)
     assert 1 <= len(found) <= 4 and (teeth.nodes[found, 1] > 2.5).all()
+    gables = teeth.nodes[teeth.boundary_loops[0]]  # where the scan has corners there, they are its gables
+    assert not len(zigzags(teeth, gables, 1.0))
+    assert len(zigzags(teeth, gables - [0.0, 0.3, 0.0], 1.0)) == len(found)
 
 
 def test_more_than_one_percent_missed_by_half_a_member_is_a_warning_with_its_place() -> None:
@@ -449,3 +454,16 @@ def test_the_verdict_says_how_much_was_left_out_as_asked_for() -> None:
         "left out: 13,856 points (27.16%) outside the box, near (1, 2, 3), 1,460 mm across, as asked for"
     ]
     assert "asked" not in str(replace(found, left_out=()))
+
+
+def test_a_corner_where_no_scan_is_cannot_be_cut_off() -> None:
+    """It was guessed from the sides of a bow. At a corner that the scan has, the same is a warning."""
+    grid = lattice()
+    boundary = bounded(grid)
+    (loop,) = boundary.loops
+    points, at = loop.points.copy(), int(loop.corner_at[0])
+    points[at] *= 1.0 + 0.5 / np.linalg.norm(points[at])
+    guessed = Boundary((replace(loop, points=points),))
+    for scan, said in ((loop.points, False), (points, True)):
+        samples = cast(Any, SimpleNamespace(measured_points=scan, spacing=0.02))
+        assert bool(places_aside(grid, guessed, 1.0, samples)) == said

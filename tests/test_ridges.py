@@ -14,8 +14,9 @@ from steps import steps_of
 from typed import known
 
 from scantruss import Grid, PointCloud, Settings, grid_from_points
+from scantruss.boundary.find import find_boundary
 from scantruss.check.certify import Judged, judge
-from scantruss.constraints.find import wanted_ridges
+from scantruss.constraints.find import find_constraints, wanted_ridges
 from scantruss.constraints.fold_tracing import Tracer, is_even, parts_of_fold
 from scantruss.constraints.ridge_ends import Ridge, join_ends
 from scantruss.constraints.ridges import find_ridges
@@ -373,3 +374,37 @@ def test_a_ring_closes_though_it_comes_back_a_little_beside_its_start() -> None:
         radius = np.linalg.norm(places - places.mean(axis=0), axis=1).mean()
         around = np.linalg.norm(np.roll(places, -1, axis=0) - places, axis=1).sum()
         assert around < 1.05 * 2.0 * np.pi * radius
+
+
+def bow(opening: float) -> PointCloud:
+    """Two planes that meet at an angle in degrees; its stem is 1.2 long."""
+    rng = np.random.default_rng(8)
+    along, up, side = rng.uniform(0, 4, 30_000), rng.uniform(0, 1.2, 30_000), rng.choice([-1.0, 1.0], 30_000)
+    half = np.radians(0.5 * opening)
+    points = np.column_stack([along * np.cos(half), side * along * np.sin(half), up])
+    return PointCloud.from_array(points + rng.normal(0.0, 0.002, points.shape))
+
+
+@pytest.mark.parametrize("length", [0.6, 0.7])
+def test_an_acute_stem_is_a_ridge_though_it_is_short(length: float) -> None:
+    """Triangles ran across it, inside the bow. A blunt one of that length is none."""
+    settings = Settings(length=length)
+    cloud = bow(80.0)
+    (stem,) = find_ridges(sample_surface(cloud, settings), settings)
+    assert np.abs(stem.places[:, :2]).max() < 0.15 * length and np.ptp(stem.places[:, 2]) > 0.9
+    assert not find_ridges(sample_surface(bow(125.0), settings), settings)
+
+
+def test_a_ridge_that_curls_up_to_a_tip_ends_in_its_corner() -> None:
+    """The straight continuation of a hip leaves the scan before the tip of its eaves, which was cut off by a third of a member."""
+    rng = np.random.default_rng(2)
+    x, y = rng.uniform(-20.0, 20.0, (2, 60_000))
+    far, near = np.maximum(np.abs(x), np.abs(y)) / 20.0, np.minimum(np.abs(x), np.abs(y)) / 20.0
+    points = np.column_stack([x, y, 14.0 + 16.0 * (1.0 - far) ** 1.5 + 3.0 * far**4 * near**4])
+    cloud, settings = PointCloud.from_array(points + rng.normal(0.0, 0.012, points.shape)), Settings(length=4.2)
+    samples, boundary = find_boundary(sample_surface(cloud, settings), settings)
+    boundary, constraints = find_constraints(samples, boundary, settings)
+    assert sum(line.ridge for line in constraints.lines.whole) >= 4
+    tips = np.array([[x, y, 17.0] for x in (-20.0, 20.0) for y in (-20.0, 20.0)]) - cloud.origin
+    away = np.linalg.norm(boundary.loops[0].corners[:, None] - tips, axis=2).min(axis=0)
+    assert away.max() < 0.1 * settings.length

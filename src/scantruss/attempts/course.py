@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from ..check.limits import with_ridges_given_up
 from ..errors import CertificateError, FrontError, OneSidedError, ScanTrussError
 from .limit import AttemptLimit, joins_sheets, only_leaves_out
-from .looks import runs_along_rods
+from .looks import runs_along_rods, stands_on_columns
 from .table import attempts
 
 if TYPE_CHECKING:
@@ -29,7 +29,8 @@ class AttemptCourse:
     What follows is put in next, each by one law:
 
     - `RIDGES_GIVEN_UP`: an attempt fails near ridges; each gives up one place more at least, of `FAULTS_WITHOUT_RIDGES`.
-    - `WITHOUT_RODS`: a grid passes but runs along rods; once, as the last attempt. That with fewer warnings is taken.
+    - `WITHOUT_RODS`: a grid passes but runs along rods; once, as the last attempt. That with fewer warnings is taken, or that without
+      them where they are columns of a shell: a grid around some of them is no part of it.
     - least effort: none passes, and sheets are not too near each other; all attempts again, once: more effort never gives less.
 
     Parameters
@@ -62,6 +63,7 @@ class AttemptCourse:
         self._row_begun: Attempt | None = None  # the attempt of the table that those put in follow
         self._first_fault: FrontError | None = None  # of that attempt
         self._passed: Grid | None = None
+        self._around_columns = False  # whether that is a grid around columns
 
     def __iter__(self) -> Iterator[Attempt]:
         """Yield each attempt, once what came of the one before was noted by `passed` or `failed`."""
@@ -106,9 +108,10 @@ class AttemptCourse:
         if self._passed is not None:  # this one is without rods
             assert grid.certificate is not None and self._passed.certificate is not None
             fewer = len(grid.certificate.warnings) < len(self._passed.certificate.warnings)
-            self._passed = grid if fewer else self._passed
+            self._passed = grid if fewer or self._around_columns else self._passed
             return
-        if runs_along_rods(grid, self._cloud, attempt.settings):
+        self._around_columns = stands_on_columns(self._cloud, attempt.settings)
+        if self._around_columns or runs_along_rods(grid, self._cloud, attempt.settings):
             assert self._row_begun is not None
             without = self._row_begun.settings.replace(keep_rods=False)
             self._follows = replace(self._row_begun, settings=without, row=WITHOUT_RODS)

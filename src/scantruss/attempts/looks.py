@@ -11,7 +11,7 @@ from ..constraints.ridges import find_ridges
 from ..surface.chosen_samples import ROD
 from ..surface.samples import sample_surface
 from ..surface.sharp_edges import EDGE_SHARE, FEWEST_NEEDED
-from ..surface.supports import are_columns
+from ..surface.supports import are_columns, free_columns
 
 if TYPE_CHECKING:
     from ..grid.certificate import Certificate
@@ -127,6 +127,14 @@ def runs_along_rods(grid: Grid, cloud: PointCloud, settings: Settings) -> bool:
     )
 
 
+def stands_on_columns(cloud: PointCloud, settings: Settings) -> bool:
+    """Whether a shell stands on columns so thin that a grid around them is no part of it, where these are not left out yet."""
+    if not settings.keep_rods or settings.method != "default":
+        return False
+    surface = sample_surface(cloud, settings).surface
+    return bool(free_columns(surface.mean, surface.radius, settings.length).any())
+
+
 def _has_more_outliers(cloud: PointCloud, settings: Settings) -> bool:
     """Whether there are outliers that do not show where samples stand alone, as they are many or the members long."""
     always = sample_surface(cloud, settings.replace(judge_outliers="always")).outliers
@@ -155,6 +163,8 @@ def _stands_on_rods(cloud: PointCloud, settings: Settings) -> bool:
         return False
     parts = [len(each.pieces) + len(each.not_chosen) for each in (cut, without)]
     if parts[1] > parts[0] or (cut.rough > VERY_ROUGH_SCAN and without.rough <= ROUGH_SCAN):
+        return True
+    if stands_on_columns(cloud, settings):
         return True
     return cloud.z_is_up and are_columns(without.scan[without.judged == ROD], without.surface.mean, settings.length)
 

@@ -16,7 +16,7 @@ from .left_out import points_together
 from .limits import HEXAGON_BOUNDARY, NOISES_OFF, Figure
 
 if TYPE_CHECKING:
-    from ..boundary.find import Boundary
+    from ..boundary.find import Boundary, Loop
     from ..grid.grid import Grid
     from ..surface.samples import SurfaceSamples
     from .distances import Distances
@@ -38,7 +38,7 @@ MOST_HEIGHT_OF_LEVEL = 0.5
 WARN_CUT = 0.15
 
 
-def places_aside(grid: Grid, boundary: Boundary, length: float) -> list[Fault]:
+def places_aside(grid: Grid, boundary: Boundary, length: float, samples: SurfaceSamples | None = None) -> list[Fault]:
     """Return warnings of a boundary that leaves the scan's, and of corners that it cuts off, each with its places.
 
     Measured both ways: at a spike the nodes are off the curve of the scan, at a corner that is cut off the curve is off the members.
@@ -51,9 +51,37 @@ def places_aside(grid: Grid, boundary: Boundary, length: float) -> list[Fault]:
         Loops of the scan; those of limbs that are closed by caps are no boundary of the grid.
     length : float
         Desired member length where the grid has none of its own [scan unit].
+    samples : SurfaceSamples, optional
+        Of the scan: a corner with no point of it nearby was guessed from the sides of a bow, and is none to follow.
     """
+    if samples is not None:
+        boundary = replace(boundary, loops=tuple(_without_guesses(loop, samples, length) for loop in boundary.loops))
     warnings = (figure.beyond(figure.poor) for figure in _figures_at_boundary(grid, boundary, length))
     return [warning for warning in warnings if warning is not None]
+
+
+def _without_guesses(loop: Loop, samples: SurfaceSamples, length: float) -> Loop:
+    """Return a loop without the corners that lie far from all points of the scan, and without what of it leads to them."""
+    if not len(loop.corner_at):
+        return loop
+    points, away = samples.measured_points, np.empty(len(loop.points))
+    boxes = boxes_of(points, max(POINT_BOX * length, 2.0 * samples.spacing))
+    nearest_distances(loop.points, points, boxes, 2.0 * samples.spacing, away)
+    member = length * (np.ones(len(away)) if loop.desired is None else loop.desired)
+    guessed = away > np.maximum(EMPTY_FROM * member, SPACINGS_OUT * samples.spacing)
+    corners = loop.corner_at[guessed[loop.corner_at]]
+    if not len(corners):
+        return loop
+    gaps = np.linalg.norm(loop.points[:, None] - loop.points[corners], axis=2).min(axis=1)
+    stays = ~(guessed & (gaps < member))
+    numbers = np.cumsum(stays) - 1
+    return replace(
+        loop,
+        points=loop.points[stays],
+        corner_at=numbers[loop.corner_at[stays[loop.corner_at]]],
+        line_at=numbers[loop.line_at[stays[loop.line_at]]],
+        desired=None if loop.desired is None else loop.desired[stays],
+    )
 
 
 def boundary_left(grid: Grid, boundary: Boundary, length: float) -> list[Fault]:

@@ -105,7 +105,7 @@ class Judged:
         offsets, (gaps, bridged), doubtful, aside, beyond, beside, apart, bare, peaks = side_by_side(
             lambda: _offsets(grid, samples, length),
             lambda: bridged_gaps(grid, samples, boundary, length),
-            lambda: [] if settings.boundary else doubtful_places(grid, samples, length),
+            lambda: [] if settings.boundary else doubtful_places(grid, samples, length, boundary.corners),
             lambda: _at_boundary(grid, samples, boundary, found, followed, members, length),
             lambda: boundary_faults(grid, samples, boundary, length),
             lambda: [] if rough else _beside(grid, samples, found, followed, members),
@@ -335,7 +335,7 @@ def _at_boundary(
     length: float,
 ) -> list[Fault]:
     """Return warnings of where the boundary of a grid is not that of its scan; parameters as of `stops_short`."""
-    aside = places_aside(grid, boundary, length)
+    aside = places_aside(grid, boundary, length, samples)
     return aside + stops_short(grid, samples, found, followed, members, aside)
 
 

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from ..surface.samples import SurfaceSamples
 
 NODES_TURNED_OVER = 6  # nodes along a boundary in which turns are summed
+AT_CORNER = 0.1  # distance of a node from a corner of the scan up to which it is that corner [member lengths]
+NO_CORNERS = np.zeros((0, 3))
 ZIGZAG_TURN = 130.0  # sum of the turns to either side among them from which on a boundary runs zigzag [degree]
 SMALL_HOLE = 12  # nodes around a hole up to which it may be none
 # share of a hole that must be filled by points that were left out for it to be none: a few outliers in a courtyard, or a mast, fill less
@@ -27,8 +29,13 @@ FILLS_WITHIN = 0.62
 POINTS_AROUND_HOLE, POINTS_COMPARED, NEIGHBOR_COUNTED = 3000, 200, 6  # by how many points that is found
 
 
-def doubtful_places(grid: Grid, samples: SurfaceSamples, length: float) -> list[Fault]:
-    """Return warnings of boundaries that run zigzag and of small holes that may be none; desired member length given [scan unit]."""
+def doubtful_places(
+    grid: Grid, samples: SurfaceSamples, length: float, corners: np.ndarray = NO_CORNERS
+) -> list[Fault]:
+    """Return warnings of boundaries that run zigzag and of small holes that may be none; desired member length given [scan unit].
+
+    corners : (C, 3) of the scan's boundary, which turns there
+    """
     label = component_labels(len(grid.nodes), grid.edges[:, 0], grid.edges[:, 1])
     loops = sorted(grid.boundary_loops, key=len, reverse=True)
     pieces = [int(label[loop[0]]) for loop in loops]
@@ -37,7 +44,7 @@ def doubtful_places(grid: Grid, samples: SurfaceSamples, length: float) -> list[
     left_out = [grid.nodes[loop].mean(axis=0) for loop, kind in zip(holes, kinds, strict=True) if kind == "left out"]
     sparse = [grid.nodes[loop].mean(axis=0) for loop, kind in zip(holes, kinds, strict=True) if kind == "sparse"]
     found = (
-        _warning("zigzag", "runs zigzag at its boundary", grid.nodes[zigzags(grid)], grid.origin),
+        _warning("zigzag", "runs zigzag at its boundary", grid.nodes[zigzags(grid, corners, length)], grid.origin),
         _warning("hole", "has a hole where points were left out", np.array(left_out), grid.origin),
         _warning("hole", "has a hole that may be none, so far apart are the points", np.array(sparse), grid.origin),
     )
@@ -53,8 +60,11 @@ def _warning(kind: str, words: str, places: np.ndarray, origin: np.ndarray) -> F
     return Fault(kind, words + more, first, tuple(others))
 
 
-def zigzags(grid: Grid) -> np.ndarray:
-    """Return the nodes (K,) in the middle of zigzags: on a few members around them a boundary turns much to both sides."""
+def zigzags(grid: Grid, corners: np.ndarray = NO_CORNERS, length: float = 0.0) -> np.ndarray:
+    """Return the nodes (K,) in the middle of zigzags: on a few members around them a boundary turns much to both sides.
+
+    A turn at a corner of the scan (C, 3), as at the peak of a gable, is none; desired member length given [scan unit].
+    """
     a, b, c = grid.nodes[grid.triangles.T]
     upward = np.zeros_like(grid.nodes)
     for corner in grid.triangles.T:
@@ -68,6 +78,8 @@ def zigzags(grid: Grid) -> np.ndarray:
         across = np.cross(behind, ahead)
         turn = np.degrees(np.arctan2(np.linalg.norm(across, axis=1), (behind * ahead).sum(axis=1)))
         turn *= np.sign((across * upward[loop]).sum(axis=1))
+        gaps = np.linalg.norm(grid.nodes[loop][:, None] - corners, axis=2).min(axis=1, initial=np.inf)
+        turn[gaps <= AT_CORNER * length] = 0.0
         around = np.array([np.roll(turn, NODES_TURNED_OVER // 2 - k) for k in range(NODES_TURNED_OVER)])
         least = np.minimum(np.maximum(around, 0.0).sum(axis=0), np.maximum(-around, 0.0).sum(axis=0))
         highest = least >= np.max([np.roll(least, k) for k in range(-NODES_TURNED_OVER, NODES_TURNED_OVER + 1)], axis=0)

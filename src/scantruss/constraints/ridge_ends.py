@@ -21,6 +21,7 @@ WAY_TO_CORNER = 1.5  # longest way from an end to a corner or another ridge [mem
 REACH_BACK = 0.5  # longest way back to a corner or another ridge, where an end has gone too far [member lengths]
 LARGEST_MISS = 0.35  # largest distance of an end's continuation from the corner that it makes for [member lengths]
 LEAST_FREE_RIDGE = 2.5  # least length of a ridge of which an end is free [member lengths]
+LEAST_ACUTE_RIDGE = 1.4  # ... where it is acute: no grid follows the scan there without it [member lengths]
 LEAST_RIDGE = 0.6  # least length of any other [member lengths]
 
 
@@ -31,6 +32,7 @@ class Ridge:
     places: np.ndarray  #: (K, 3) along it; the first of a ring is not repeated
     sharp: bool  #: folded by the full angle; False: by less, it counts only beside others
     ring: bool = False
+    acute: bool = False  #: folded by about a right angle or more
 
     def moved(self, places: np.ndarray) -> Ridge:
         """The same ridge in other places (K, 3)."""
@@ -85,7 +87,8 @@ def join_ends(traced: list[Ridge], length: float) -> list[Ridge]:
         first, last = led.get((i, 0)), led.get((i, -1))
         line = lines[i] if first is not None or last is not None else ridge.places
         line = _led(_led(line, last)[::-1], first)[::-1]
-        least = LEAST_RIDGE if first is not None and last is not None else LEAST_FREE_RIDGE
+        free = LEAST_ACUTE_RIDGE if ridge.acute else LEAST_FREE_RIDGE
+        least = LEAST_RIDGE if first is not None and last is not None else free
         if np.linalg.norm(np.diff(line, axis=0), axis=1).sum() >= least * length:
             found.append(ridge.moved(line))
     return found
@@ -148,7 +151,9 @@ def _bridged(ridges: list[Ridge], length: float) -> list[Ridge]:
         (i, one), (j, two) = ((number // 2, ends[number]) for number in pair)
         before = found[i].places if one.at == -1 else found[i].places[::-1]
         after = found[j].places if two.at == 0 else found[j].places[::-1]
-        joined = Ridge(np.concatenate([before, after]), found[i].sharp or found[j].sharp)
+        joined = Ridge(
+            np.concatenate([before, after]), found[i].sharp or found[j].sharp, acute=found[i].acute and found[j].acute
+        )
         found = [*(ridge for k, ridge in enumerate(found) if k not in (i, j)), joined]
         ends = [*(end for k, end in enumerate(ends) if k // 2 not in (i, j)), *_ends_of(joined)]
     return found

@@ -24,6 +24,7 @@ END_BESIDE_RIDGE = 0.35  # a weaker ridge whose end is so near to a ridge belong
 FAULT_REACH = 1.8  # distance from a fault within which ridges are given up [member lengths]
 LEAST_REMAINDER = 2.0  # least length of what is left of such a ridge [member lengths]
 AT_RIDGE = 0.75  # farthest that a ridge passes a place that names it [member lengths]
+ACUTE_RIDGE = np.radians(85.0)  # median fold from which on a ridge is acute
 LONGEST_BETWEEN_CORNERS = 1.8  # longest ridge that is looked for between two corners [member lengths]
 SHORTEST_RIDGE = 0.35  # shortest such ridge [member lengths]
 
@@ -57,7 +58,10 @@ class FoldLines:
         traced = (
             [*sharp, *(folds for folds in weak if not runs_along(folds, wide, length)), *wide] if wide else self.narrow
         )
-        lines = [Ridge(folds["place"], is_sharp(folds, tracer.angle)) for folds in traced]
+        lines = [
+            Ridge(folds["place"], is_sharp(folds, tracer.angle), acute=bool(np.median(folds["bend"]) >= ACUTE_RIDGE))
+            for folds in traced
+        ]
         ridges = kept_ridges(join_ends(lines, length), length)
         ridges = [ridge.moved(tracer.onto_scan(ridge.places)) for ridge in ridges + short_ridges(ridges, tracer)]
         return tuple(sorted(ridges, key=lambda ridge: (ridge.ring, -len(ridge.places))))

@@ -21,6 +21,11 @@ PLACES_OF_DIRECTION = 3  # places from which the direction at the end of a ridge
 STEADY_PLACES_OF_DIRECTION, PLACES_LEFT_OUT = 9, 3
 # distance of a corner from the continuation of a ridge up to which the corner is kept [member lengths]
 CORNER_KEPT_WITHIN = 0.1
+# distance from the end of the scan along a ridge within which a corner beyond it is that of the ridge [member lengths]
+CORNER_BEYOND_WITHIN = 0.6
+POINTS_AT_CORNER = (
+    0.2  # distance of such a corner from the nearest point up to which the scan reaches it [member lengths]
+)
 DENSITY_REACH = 0.5  # how far back along the ridge the density of the points is measured [member lengths]
 LOOK_FORWARD = 2.0  # how far the scan may go on along it [member lengths]
 GAP_AT_END = 14.0  # a gap so many times as long as the usual one between points along the ridge is the end of the scan
@@ -38,7 +43,8 @@ def with_ridge_ends(boundary: Boundary, ridges: list[Ridge], samples: SurfaceSam
             k = int(np.argmin(away))
             if away[k] < BOUNDARY_REACH * length and not _makes_for_corner(line, loops[k], length):
                 end = scan_end(line, samples, length)
-                loops[k] = loops[k] if end is None else _bent(loops[k], end, length)
+                if end is not None and not _is_short_of_corner(end, line, loops[k], samples, length):
+                    loops[k] = _bent(loops[k], end, length)
     return replace(boundary, loops=tuple(loops))
 
 
@@ -51,6 +57,21 @@ def _makes_for_corner(line: np.ndarray, loop: Loop, length: float) -> bool:
     ahead /= max(float(np.linalg.norm(ahead)), 1e-300)
     corner = loop.corners[np.linalg.norm(loop.corners - line[-1], axis=1).argmin()]
     return bool(np.linalg.norm(np.cross(corner - from_there, ahead)) < CORNER_KEPT_WITHIN * length)
+
+
+def _is_short_of_corner(end: np.ndarray, line: np.ndarray, loop: Loop, samples: SurfaceSamples, length: float) -> bool:
+    """Whether the end of the scan (3,) along a ridge (K, 3) is short of a corner to which its points reach, as at a tip that curls up."""
+    if not len(loop.corner_at):
+        return False
+    corner = loop.corners[np.linalg.norm(loop.corners - end, axis=1).argmin()]
+    gap, ahead = corner - end, line[-1] - line[max(len(line) - PLACES_OF_DIRECTION, 0)]
+    if np.linalg.norm(gap) > CORNER_BEYOND_WITHIN * length or gap @ ahead <= 0.0:
+        return False
+    surface = samples.surface
+    near = np.flatnonzero(np.linalg.norm(surface.mean - corner, axis=1) < length)
+    parts = [surface.points[surface.start[s] : surface.start[s + 1]] for s in near.tolist()]
+    away = np.linalg.norm(np.concatenate([np.zeros((0, 3)), *parts]) - corner, axis=1)
+    return bool(away.min(initial=np.inf) < POINTS_AT_CORNER * length)
 
 
 def scan_end(line: np.ndarray, samples: SurfaceSamples, length: float) -> np.ndarray | None:

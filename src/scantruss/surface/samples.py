@@ -42,7 +42,7 @@ from .pieces import chosen_pieces, large_pieces, number_pieces, sample_areas
 from .rods import lengths_of_rods, pieces_of_rods, rod_points
 from .shape import check_is_surface, layers_of_surface
 from .size_field import length_field
-from .supports import support_samples
+from .supports import free_columns, support_samples
 
 BESIDE_SAMPLES = 1.5  # distance from points of the boundary within which all points are used [`sample_spacing`]
 BROAD_PASSES = 4  # times that normals are averaged with those beside them for the sheet as a whole
@@ -372,16 +372,23 @@ def _rods_of(points: np.ndarray, spacing: float, asked: Asked) -> np.ndarray:
     lengths = lengths_of_rods(asked.length, spacing)
     radii = [radius_of_samples(asked._replace(length=length), spacing) for length in lengths]
     finest = link_samples(points, radii[0], lengths[0], spacing)
-    rods = _rods_at(lengths[0], finest, len(points), asked)
-    for length, radius in zip(lengths[1:], radii[1:], strict=True):
+    column = (finest.owner >= 0) & (free_columns(finest.mean, radii[0], asked.length)[finest.owner] > 0)
+    rods = np.zeros(len(points), np.bool_)
+    for length, radius in zip(lengths, radii, strict=True):
         left = np.flatnonzero(~rods)
-        found = link_samples(np.ascontiguousarray(points[left]), radius, length, spacing)
-        rods[left[_rods_at(length, found, len(left), asked)]] = True
+        first = length == lengths[0]
+        found = finest if first else link_samples(np.ascontiguousarray(points[left]), radius, length, spacing)
+        known = column[left] & (length == lengths[-1])
+        rods[left[_rods_at(length, found, known, asked)]] = True
     if len(lengths) > 1 and rods.any():
         rods |= pieces_of_rods(finest, rods, radii[0], asked.length)
     return rods if not rods.all() else np.zeros(len(points), np.bool_)  # then they are the scan itself
 
 
-def _rods_at(length: float, found: Linked, points: int, asked: Asked) -> np.ndarray:
-    """Return which points (N,) bool belong to rods by their samples for a member length."""
-    return rod_points(found, points, length, support_samples(found, length) if asked.z_is_up else None)
+def _rods_at(length: float, found: Linked, column: np.ndarray, asked: Asked) -> np.ndarray:
+    """Return which points (N,) bool belong to rods by their samples for a member length, of which some are known for columns (N,) bool."""
+    samples = len(found.mean)
+    owner = np.where(found.owner >= 0, found.owner, samples)
+    support = 2 * np.bincount(owner, column, samples + 1) > np.bincount(owner, minlength=samples + 1)
+    known = support[:samples] | support_samples(found, length) if asked.z_is_up else support[:samples]
+    return rod_points(found, len(column), length, known)

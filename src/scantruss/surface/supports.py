@@ -18,6 +18,16 @@ MOST_UNDER = 0.3  # share of the samples of a shell that lie under others of it,
 LEAST_SLENDER = 1.5  # height of a column, least [widths]
 MOST_BELOW_FLOOR = 0.01  # share of the samples that may lie below a floor
 MOST_SUPPORTED = 0.2  # share of the samples from which on they are no supports but the shell
+SLAB_RADII = 3.0  # height and width of the cells in which columns without a floor are looked for, least [sample radii]
+# by how much a column's middle moves from slab to slab, and its width over its height, at most [member lengths], [widths]
+UPRIGHT_WITHIN, EVEN_WITHIN = 0.2, 0.3
+WIDEST_COLUMN = 1.6  # widest column without a floor in plan [member lengths]; a grid has five members or less around it
+MOST_IN_COLUMNS = 0.4  # share of the samples from which on they are no columns but the shell
+LEAST_ROUND = (
+    0.2  # least variance in plan across a column, in that along it: a strip of a shell has less, half a tube 0.19
+)
+OUTSIDE = 0.75  # distance from the middle of a column from which on a sample is none of it [widths]
+FEWEST_OF_SHELL = 6  # fewest samples above a column, near it, that are a shell
 
 
 def support_samples(found: Linked, length: float) -> np.ndarray:
@@ -40,6 +50,70 @@ def support_samples(found: Linked, length: float) -> np.ndarray:
         own = which[group == each]
         support[own] = np.ptp(mean[own, :2], axis=0).max() <= WIDEST_SUPPORT * length
     return support if support.mean() <= MOST_SUPPORTED else none
+
+
+def free_columns(mean: np.ndarray, radius: float, length: float) -> np.ndarray:
+    """Return the number (S,) from 1 of the column of each sample, 0 where it is of none, of a shell that may stand on no floor.
+
+    They are upright, straight, slender tubes under it. Under a body that is closed half of it lies, in whatever direction: its legs
+    and handles are none.
+
+    Parameters
+    ----------
+    mean : (S, 3) positions of the samples, z upwards where they are of a shell on columns [scan unit]
+    radius : of the samples [scan unit]
+    length : desired member length [scan unit]
+    """
+    column, under = np.zeros(len(mean), np.int64), _under_shell(mean, length)
+    if not 0.0 < under.mean() <= MOST_UNDER + MOST_IN_COLUMNS:
+        return column
+    cell = max(CELL_WIDTH * length, SLAB_RADII * radius)
+    slab = np.floor((mean[:, 2] - mean[:, 2].min()) / cell).astype(np.int64)
+    order = np.argsort(slab, kind="stable")
+    pieces: list[np.ndarray] = []  # narrow parts of the slabs
+    shape: list[tuple[float, ...]] = []  # slab, middle in plan and width of each
+    for which in np.split(order, np.flatnonzero(np.diff(slab[order])) + 1):
+        if not under[which].any():
+            continue
+        group = _beside_each_other(mean[which, :2], cell)
+        for own in np.split(which[np.argsort(group, kind="stable")], np.flatnonzero(np.diff(np.sort(group))) + 1):
+            low, high = mean[own, :2].min(axis=0), mean[own, :2].max(axis=0)
+            width = float((high - low).max())
+            if 0.0 < width <= WIDEST_COLUMN * length:
+                pieces.append(own)
+                shape.append((slab[own[0]], *(0.5 * (low + high)), width))
+    for chain in _chains(np.array(shape).reshape(-1, 4), length):
+        own, width = np.concatenate([pieces[each] for each in chain]), np.array(shape)[chain, 3]
+        if np.ptp(width) <= EVEN_WITHIN * width.max() and _is_column(mean, own, float(width.max()), length):
+            column[own] = column.max() + 1
+    is_shell = (under & (column == 0)).mean() <= MOST_UNDER and (column > 0).mean() <= MOST_IN_COLUMNS
+    return column if is_shell else np.zeros_like(column)
+
+
+def _chains(shape: np.ndarray, length: float) -> list[np.ndarray]:
+    """Return the parts (K, 4) of slabs that stand on each other, straight and of one width, as lists of their numbers."""
+    pairs = []
+    for below, (level, x, y, width) in enumerate(shape):
+        above = np.flatnonzero(shape[:, 0] == level + 1)
+        near = np.hypot(shape[above, 1] - x, shape[above, 2] - y) <= UPRIGHT_WITHIN * length
+        even = np.abs(shape[above, 3] - width) <= EVEN_WITHIN * np.maximum(shape[above, 3], width)
+        pairs += [(below, on_it) for on_it in above[near & even]]
+    one, other = np.array(pairs, np.int64).reshape(-1, 2).T
+    label = component_labels(len(shape), one, other) if len(shape) else one
+    return [np.flatnonzero(label == each) for each in np.unique(label)]
+
+
+def _is_column(mean: np.ndarray, own: np.ndarray, width: float, length: float) -> bool:
+    """Whether some samples (K,) in slabs on each other are slender and round, and samples (S, 3) beside them are above them all."""
+    bottom, top = mean[own, 2].min(), mean[own, 2].max()
+    if top - bottom < max(LEAST_SLENDER * width, length):
+        return False
+    variances = np.linalg.eigvalsh(np.cov(mean[own, :2], rowvar=False))
+    if variances[0] < LEAST_ROUND * variances[1]:
+        return False
+    away = np.hypot(*(mean[:, :2] - np.median(mean[own, :2], axis=0)).T)
+    beside = (away > OUTSIDE * width) & (away < width + length)
+    return int((beside & (mean[:, 2] > top)).sum()) >= FEWEST_OF_SHELL
 
 
 def are_columns(rods: np.ndarray, shell: np.ndarray, length: float) -> bool:
