@@ -1,13 +1,18 @@
 """Ridges that no grid passes with are given up near the faults: which part, how long and where is said."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from small_grids import dome
+from typed import known
 
 from scantruss.check.limits import with_ridges_given_up
+from scantruss.check.unfollowed import broken_ridges
 from scantruss.constraints.ridge_ends import Ridge
 from scantruss.constraints.ridges import FAULT_REACH, cut_around, given_up, length_along
 from scantruss.grid.certificate import Certificate
+from scantruss.grid.line_sets import RIDGE, LineSet
 
 STRIDE = 0.25
 
@@ -43,6 +48,25 @@ def test_a_ring_loses_one_part_wherever_it_begins(turn: int) -> None:
     (gone,) = given_up([Ridge(np.roll(ring, turn, axis=0), True, ring=True)], ring[:1], 1.0)
     assert length_along(gone) == pytest.approx(2.0 * FAULT_REACH, abs=3.0 * STRIDE)
     assert np.linalg.norm(gone[len(gone) // 2] - ring[0]) <= STRIDE
+
+
+@pytest.mark.parametrize(("last", "breaks"), [(6, 0.0), (7, 1.0), (8, 2.0), (10, 0.0)])
+def test_a_ridge_that_ends_before_the_corner_for_which_it_makes_is_said(last: int, breaks: float) -> None:
+    """Two ridges meet in the node 6, 6 of a dome; a third comes from its edge as far as the node `last`, 6."""
+    count, size = 12, 4.0
+    others = [[count * i + 6 for i in range(7)], [count * 6 + j for j in range(6, 12)]]
+    chains = [*others, [count * i + 6 for i in range(11, last - 1, -1)]]
+    sets = tuple(LineSet(f"ridge {number}", RIDGE, np.array(chain)) for number, chain in enumerate(chains, 1))
+    lines = np.array([pair for chain in chains for pair in pairwise(chain)])
+    grid = dome(count, size, unit="m", lines=lines, line_sets=sets)
+    found = broken_ridges(grid, np.full(9, size))
+    assert len(found) == (breaks > 0.0)
+    if found:
+        away = float(np.linalg.norm(grid.nodes[count * last + 6] - grid.nodes[count * 6 + 6]))
+        assert away == pytest.approx(breaks * size, rel=0.1)
+        assert f"breaks off a ridge {away:.3g} m before the corner" in found[0].words
+        middle = 0.5 * (grid.nodes[count * last + 6] + grid.nodes[count * 6 + 6]) + grid.origin
+        assert np.allclose(known(found[0].where), middle)
 
 
 def test_the_warning_names_length_ends_and_middle_of_each_part() -> None:
