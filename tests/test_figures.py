@@ -6,9 +6,11 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from scantruss import Grid
+from scantruss import Certificate, Grid
 from scantruss.errors import words_of_number
+from scantruss.grid.certificate import LeftOut, Spread, Worst
 from scantruss.kernels.geometry.components import component_labels
+from scantruss.report.figures import distance_lines
 
 
 @pytest.mark.kernels
@@ -54,3 +56,17 @@ def test_things_joined_by_links_have_the_lowest_of_them_as_label(count: int, lin
         for thing in both:
             groups[thing] = both
     assert component_labels(count, pairs[:, 0], pairs[:, 1]).tolist() == [min(groups[thing]) for thing in range(count)]
+
+
+@pytest.mark.parametrize(("largest", "listed"), [(8.5, True), (0.7, False)])
+def test_the_farthest_point_is_said_to_be_left_out_where_it_is(largest: float, listed: bool) -> None:
+    floor = LeftOut("floor", 130, 0.13, (0.0, 0.0, 0.0), 36.0, 8.5)
+    away = Spread(0.01, 8.0, 8.4, Worst(largest, (1.0, 2.0, 3.0)))
+    parts = (floor, LeftOut("outliers", 20, 0.02, farthest=3.0), LeftOut("of other classes", 900, 0.4, asked=True))
+    found = Certificate("m", 0.5, True, True, 1, 1, 1, 1, 1, 0, points=1000, left_out=parts, scan_distance=away)
+    (line, _), ((name, _, _),) = distance_lines(found), found.worst_places()
+    assert (found.farthest_listed is floor) == listed == name.endswith(", one left out")
+    said = (
+        "; 15.00% of them are listed as left out, the farthest among them: in a floor under the others (near 1, 2, 3)"
+    )
+    assert line.endswith(said) == listed

@@ -22,6 +22,7 @@ from scantruss.kernels.surface.rods import spreads_around
 from scantruss.scan.member_length import length_range
 from scantruss.surface.chosen_samples import KEPT, ROD
 from scantruss.surface.linked_samples import link_samples
+from scantruss.surface.pieces import by_size
 from scantruss.surface.rods import LENGTH_STEP, lengths_of_rods, rod_points
 from scantruss.surface.samples import SurfaceSamples, sample_surface
 from scantruss.surface.supports import free_columns, support_samples
@@ -171,6 +172,37 @@ def test_pieces_that_are_not_there_and_words_that_are_none_are_refused(hall: tup
     for piece in ("some", "0", "1,", "-1", ""):
         with pytest.raises(st.InputError, match="piece must be auto, all, largest or numbers"):
             st.Settings(length=1.0, piece=piece)
+
+
+def sheets(*sizes: tuple[float, float, int]) -> np.ndarray:
+    """Level sheets beside one another, each with its sides and points."""
+    rng, at, parts = np.random.default_rng(4), 0.0, []
+    for width, depth, count in sizes:
+        parts.append(rng.uniform([at, 0, 0], [at + width, depth, 0.01], (count, 3)))
+        at += width + 8.0
+    return np.concatenate(parts)
+
+
+def test_no_length_changes_the_number_of_a_piece() -> None:
+    """Two are nearly as large, one of these has twice the points; a small one is dense."""
+    cloud = st.PointCloud.from_array(sheets((12, 9, 12_000), (12.2, 9, 6_000), (6, 6, 5_000)))
+    found: list[list[float]] = []
+    for length in (1.0, 1.2, 1.4, 1.7, 2.0, 2.4, 3.2):
+        settings = st.Settings(length=length)
+        samples = sample_surface(cloud, settings)
+        named = samples.named_pieces
+        found.append([float(samples.surface.mean[samples.piece == named[number], 0].min()) for number in sorted(named)])
+        for number, at in enumerate(found[-1], 1):
+            chosen = sample_surface(cloud, settings.replace(piece=str(number)))
+            assert chosen.surface.mean[chosen.kept, 0].min() == pytest.approx(at, abs=1e-9)
+    assert {len(each) for each in found} == {2, 3}
+    for each in found:
+        assert each == pytest.approx(found[0][: len(each)], abs=0.5)
+
+
+def test_pieces_of_as_large_an_area_are_numbered_by_place() -> None:
+    places = np.array([[5.0, 0, 0], [1.0, 3, 0], [1.0, 2, 0], [9.0, 0, 0]])
+    assert by_size(np.array([0, 1, 2, 3, 3, -1]), places, np.arange(4)) == [3, 2, 1, 0]
 
 
 def test_the_command_names_the_pieces_and_how_to_take_one(

@@ -109,6 +109,8 @@ def compare(
     )
     assert found.points == len(cloud.points)
     check_spread(known(found.scan_distance), away, cloud.points + cloud.origin)
+    farthest = int(away.argmax())
+    assert (found.farthest_listed is not None) == bool(samples.judged[farthest] != 0 or away[farthest] > LENGTH)
     beyond = (samples.judged == 0) & (away > 0.5 * LENGTH)
     assert found.missing == pytest.approx(beyond.mean(), abs=1e-12)
     assert found.scan_within_reach == (away <= 0.5 * LENGTH).mean()

@@ -23,6 +23,7 @@ from scantruss.scan.formats.writing import check_cloud_output, write_points
 UTM = np.array([500_000.0, 4_500_000.0, 100.0])
 POINTS = plate(500) + UTM + np.random.default_rng(3).random((500, 3)) * 1e-4  # more digits than a millimetre
 NORMALS = np.random.default_rng(4).normal(size=(500, 3))
+WITHOUT_MARK = (".csv", ".npy")  # formats that cannot say what wrote them
 
 
 @pytest.mark.parametrize("unit", ["", "m", "mm", "foot"])
@@ -30,14 +31,29 @@ NORMALS = np.random.default_rng(4).normal(size=(500, 3))
 def test_points_come_back_with_their_unit(tmp_path: Path, suffix: str, unit: str) -> None:
     path = tmp_path / f"a{suffix}"
     for normals in (None, NORMALS):
-        write_points(path, POINTS, normals=normals, unit=unit)
+        write_points(path, POINTS, normals=normals, unit=unit, force=suffix in WITHOUT_MARK)
         cloud = read_points(path)
         loss = 0.5e-3 * measure_spacing(POINTS) if suffix in (".las", ".laz") else 0.0
         assert np.abs(cloud.points + cloud.origin - POINTS).max() <= 1.01 * loss
         assert cloud.unit == (unit if suffix != ".npy" else "") and cloud.dropped == 0 and cloud.notes == ()
         before = path.read_bytes()
-        write_points(path, POINTS, normals=normals, unit=unit)
+        write_points(path, POINTS, normals=normals, unit=unit, force=suffix in WITHOUT_MARK)
         assert path.read_bytes() == before
+
+
+@pytest.mark.parametrize("suffix", sorted(WRITERS))
+def test_a_file_that_is_not_known_as_ours_is_replaced_by_force_only(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"a{suffix}"
+    path.write_bytes(b"1,2,3\n")
+    with pytest.raises(FormatError, match="force=True"):
+        write_points(path, POINTS)
+    assert path.read_bytes() == b"1,2,3\n" and list(tmp_path.iterdir()) == [path]
+    write_points(path, POINTS, force=True)
+    if suffix in WITHOUT_MARK:
+        with pytest.raises(FormatError, match="force=True"):
+            write_points(path, POINTS[:9])
+    else:
+        write_points(path, POINTS[:9])
 
 
 def test_other_readers_find_the_same(tmp_path: Path) -> None:
@@ -107,7 +123,7 @@ def test_a_cloud_that_cannot_be_written_whole_leaves_the_one_before(
 
     monkeypatch.setitem(WRITERS, suffix, on_a_full_disk)
     with pytest.raises(FormatError, match=r"cannot write .*: No space left on device"):
-        write_points(path, POINTS)
+        write_points(path, POINTS, force=True)
     assert list(tmp_path.iterdir()) == [path] and path.read_bytes() == b"before"
 
 

@@ -7,8 +7,6 @@ Step by step: `read_points` (and `clean_points`), `sample_surface`, `find_bounda
 `InputError`, `FormatError`, `FrontError` or `CertificateError`.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 
@@ -124,7 +122,7 @@ _HOMES = {
 __all__ = sorted([*_HOMES, "__version__"])
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> "Any":
     """Import a public name on first use, so that the command line starts quickly."""
     if name not in _HOMES:
         raise AttributeError(f"module 'scantruss' has no attribute {name!r}")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from ..boundary.find import find_boundary
 from ..cells.make import settings_of_triangles
 from ..check.certify import MOST_ACCEPTED
-from ..constraints.find import ridges_away_from
+from ..constraints.find import ridges_away_from, ridges_given_up
 from ..errors import words_of_place
 from ..front.orientation_field import FieldStart
 from ..settings import SAMPLE_SPACING
@@ -19,6 +19,8 @@ from .limit import FAR_MISSING, only_leaves_out
 from .looks import ROUGH_SCAN, VERY_ROUGH_SCAN, AskedScan
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from ..errors import FrontError, ScanTrussError
     from ..grid.certificate import Certificate
     from ..scan.cloud import PointCloud
@@ -72,6 +74,14 @@ class Attempt:
         settings = settings_of_triangles(self.settings)
         samples, _ = find_boundary(sample_surface(cloud, settings), settings)
         return sum(len(ridge.places) for ridge in ridges_away_from(self.faults, samples, settings, self.wide))
+
+    def ridges_given_up(self, cloud: PointCloud) -> list[np.ndarray]:
+        """Return the parts of ridges that this attempt does not follow, the longest first, each (K, 3) [scan unit]."""
+        if not self.faults:
+            return []
+        settings = settings_of_triangles(self.settings)
+        samples, _ = find_boundary(sample_surface(cloud, settings), settings)
+        return ridges_given_up(self.faults, samples, settings, self.wide)
 
     def advice(self, fault: ScanTrussError) -> str:
         """Say with which settings a grid passes that only leaves out too much: of the mean surface, or without thin limbs; else nothing."""

@@ -32,7 +32,7 @@ from .sheets import cut_apart, faults_on_sheets, nodes_of_samples
 from .slits import feet_on, narrow_gaps
 from .sparse import sparse_parts
 from .steps import unfollowed_steps
-from .unfollowed import mostly_unfollowed, off_mean_surface, rounded_peaks, unfollowed_parts
+from .unfollowed import broken_ridges, mostly_unfollowed, off_mean_surface, rounded_peaks, unfollowed_parts
 
 if TYPE_CHECKING:
     from ..boundary.find import Boundary
@@ -322,7 +322,7 @@ def _beside(
 ) -> list[Fault]:
     """Return a warning of what a grid does not follow though it lies along it; parameters as of `unfollowed_parts`."""
     parts = unfollowed_parts(grid, samples, found, followed, members)
-    return parts or unfollowed_steps(grid, samples, found, followed, members)
+    return [*(parts or unfollowed_steps(grid, samples, found, followed, members)), *broken_ridges(grid, members)]
 
 
 def _at_boundary(

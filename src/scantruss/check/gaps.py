@@ -14,6 +14,7 @@ from ..kernels.mesh.coverage import nearest_distances
 from ..surface.chosen_samples import LIMB, ROD
 from .distances import POINT_BOX, boxes_of
 from .limits import PLACES_KEPT
+from .mouths import mouths_closed
 
 if TYPE_CHECKING:
     from ..boundary.find import Boundary
@@ -52,15 +53,22 @@ def bridged_gaps(
     """Return the gaps that a grid bridges and that are not known as closed holes, the widest first, and a warning.
 
     The warning is of those that are open at the boundary of the grid: there it joins what is apart, or covers a bay. It is a fault, of
-    kind "bridged", where one of them is wider than `MOST_BRIDGED`.
+    kind "bridged", where one of them is wider than `MOST_BRIDGED`. Another is of the mouths of slots that it closes.
+
+    length : desired member length [scan unit]
+    """
+    gaps, said = _gaps_within(grid, samples, boundary, length)
+    return gaps, [*said, *mouths_closed(grid, samples, length, said)]
+
+
+def _gaps_within(
+    grid: Grid, samples: SurfaceSamples, boundary: Boundary, length: float
+) -> tuple[list[LeftOut], list[Fault]]:
+    """Return the gaps of `bridged_gaps` and the warning of those that are open at the boundary of the grid.
 
     Points at random leave a disc of radius d free with a probability of exp(-pi d^2 density), and the ring from d to twice d, of three
     times its area, tells the density there: n points around an empty disc mean that it would hold n / 3. Discs lie in the planes of
     the triangles, so that a triangle off a bent surface is none over a gap.
-
-    Parameters
-    ----------
-    length : desired member length [scan unit]
     """
     points = samples.measured_points
     boxes = boxes_of(points, max(POINT_BOX * length, 2.0 * samples.spacing))

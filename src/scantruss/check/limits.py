@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..errors import Place, words_of_number
+from ..constraints.ridges import length_along
+from ..errors import Place, words_of_number, words_of_place
 from ..grid.certificate import Certificate, Fault, place_of
 from ..grid.panels import inner_angles_of
 from ..settings import CheckSettings
@@ -158,14 +159,18 @@ def places_to_look_at(found: Certificate, missed_at: Place, rounded: float = 0.0
     return warnings
 
 
-def with_ridges_given_up(grid: Grid, places: Sequence[Place]) -> Grid:
-    """Return a grid with a warning of the places at which it gives up ridges; as it is where there are none."""
+def with_ridges_given_up(grid: Grid, parts: Sequence[np.ndarray]) -> Grid:
+    """Return a grid with a warning of the parts of ridges that it gives up, the longest first, each (K, 3); as it is without any."""
     found = grid.certificate
-    if found is None or not places:
+    if found is None or not parts:
         return grid
-    more = f" ({len(places)} such places)" if len(places) > 1 else ""
-    words = f"gives up the ridge where no grid passes with it{more}"
-    warning = Fault("ridge", words, place_of(places[0]), tuple(map(place_of, places[1:])))
+    unit, longest = f" {grid.unit}" if grid.unit else "", parts[0]
+    whole, of_longest = (words_of_number(each, 3) for each in (sum(map(length_along, parts)), length_along(longest)))
+    more = f", {len(parts)} parts, the longest {of_longest}{unit}," if len(parts) > 1 else ""
+    ends = f"from ({words_of_place(longest[0])}) to ({words_of_place(longest[-1])})"
+    words = f"gives up {whole}{unit} of ridges where no grid passes with them{more} {ends}"
+    at, *others = (place_of(part[len(part) // 2]) for part in parts)
+    warning = Fault("ridge", words, at, tuple(others))
     return grid.replace(certificate=replace(found, warnings=(*found.warnings, warning)))
 
 

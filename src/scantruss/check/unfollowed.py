@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..errors import words_of_number
 from ..grid.certificate import Fault, place_of
+from ..grid.line_sets import RIDGE, sets_of
 from .distances import distances_to_grid, heights_over
 from .folds import fold_angles
 from .left_out import points_together
@@ -46,6 +48,9 @@ MOST_OFF_MEAN, OFF_MEAN = 0.33, 0.2
 HEIGHT_OF_PEAK, FEWEST_OF_PEAK, WIDTH_OF_PEAK = 0.3, 12, 3.0
 # distance of a crest from a grid from which on it is cut off, and share of its places that may be nearer [member lengths]
 CREST_OFF, SHARE_OF_CREST = 0.1, 0.6
+# longest way from the end of a ridge to a corner for which it makes [member lengths], least cosine of the angle between that way and its
+# last members, and how many these are
+BREAKS_WITHIN, AIMS_AT, LAST_MEMBERS = 3.0, 0.9, 3
 CRESTS_MEET_WITHIN = 1.5  # distance of the ends of two crests within which they meet in a corner [member lengths]
 
 
@@ -233,3 +238,41 @@ def crests_cut_off(grid: Grid, crests: Sequence[np.ndarray], length: float) -> t
             if other not in chosen and gaps.min() < CRESTS_MEET_WITHIN * length:
                 chosen.append(other)
     return tuple(sorted(chosen))
+
+
+def broken_ridges(grid: Grid, members: np.ndarray) -> list[Fault]:
+    """Return a warning of the ridges that end before a corner for which they make.
+
+    A corner is a node in which two other ridges end. An end at the boundary of the grid or on another ridge is none.
+
+    members : (N,) desired member length at each point [scan unit]
+    """
+    lines = set(map(frozenset, grid.lines.tolist()))
+    every = [np.array(each["nodes"]) for each in sets_of(grid, RIDGE) if len(each["nodes"]) > 1]
+    rings = [len(chain) > 2 and frozenset(chain[[0, -1]].tolist()) in lines for chain in every]
+    chains = [chain for chain, is_ring in zip(every, rings, strict=True) if not is_ring]
+    ends = Counter(int(chain[at]) for chain in chains for at in (0, -1))
+    corners = np.array([node for node, count in ends.items() if count > 1], np.int64)
+    outer = {int(node) for chain in grid.boundary_loops for node in chain}
+    found: list[tuple[float, np.ndarray]] = []
+    for chain in chains:
+        others = {int(node) for other in every if other is not chain for node in other}
+        aims = corners[~np.isin(corners, chain)]
+        for inwards in (chain, chain[::-1]):
+            end = int(inwards[0])
+            if end in outer or end in others or not len(aims):
+                continue
+            ahead = grid.nodes[end] - grid.nodes[inwards[min(LAST_MEMBERS, len(inwards) - 1)]]
+            ways = grid.nodes[aims] - grid.nodes[end]
+            away = np.linalg.norm(ways, axis=1)
+            nearest = int(away.argmin())
+            straight = ways[nearest] @ ahead >= AIMS_AT * away[nearest] * np.linalg.norm(ahead)
+            if straight and away[nearest] <= BREAKS_WITHIN * members.mean():
+                found.append((float(away[nearest]), grid.nodes[end] + 0.5 * ways[nearest] + grid.origin))
+    if not found:
+        return []
+    found.sort(key=lambda each: -each[0])
+    unit, more = f" {grid.unit}" if grid.unit else "", f" ({len(found)} such places)" if len(found) > 1 else ""
+    words = f"breaks off a ridge {words_of_number(found[0][0], 3)}{unit} before the corner where others meet{more}"
+    at, *also = (place_of(place) for _, place in found[:PLACES_KEPT])
+    return [Fault("ridge", words, at, tuple(also))]

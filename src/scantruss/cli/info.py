@@ -13,6 +13,7 @@ from .shared import (
     note_corners,
     note_layers,
     note_outliers,
+    note_pieces,
     read_scan,
     settings_to_read,
     with_some_length,
@@ -71,6 +72,7 @@ def info(values: Namespace) -> None:
             samples, boundary = find_boundary(sample_surface(cloud, settings), settings, progress=bars)
         note_outliers(bars, cloud, settings, "scantruss grid")
         note_layers(bars, cloud, settings)
+        note_pieces(bars, cloud, settings)
         note_corners(bars, cloud, settings)
     print_lines(surface_lines(cloud, samples))
     field = samples.surface.field

@@ -202,10 +202,11 @@ def note_pieces(bars: Bars, cloud: PointCloud, settings: Settings) -> None:
             "a level, flat piece lies under the others, as a floor does; where the unit is m or foot it is left out, as z is up then"
         )
     unit = f" {cloud.unit}" if cloud.unit else ""
-    large = sorted({*samples.pieces, *samples.not_chosen})
+    named = samples.named_pieces
+    large = list(named.values())
     all_places = samples.surface.mean + cloud.origin
     option = "--piece" if settings.keep_rods else "--no-keep-rods --piece"
-    for number, piece in enumerate(large[:MOST_PIECES], 1):
+    for number, piece in list(named.items())[:MOST_PIECES]:
         places = all_places[samples.piece == piece]
         low, high = places.min(axis=0), places.max(axis=0)
         size = " x ".join(words_of_number(side, 3) for side in high - low)

@@ -15,7 +15,7 @@ from .fixed_lines import add_polylines
 from .fixed_nodes import check_fixed_positions
 from .network import NO_LINES, Lines, Network
 from .ridge_ends import Ridge
-from .ridges import add_ridges, cut_around, find_ridges, fold_lines, without
+from .ridges import add_ridges, cut_around, find_ridges, fold_lines, given_up, without
 from .ridges_at_boundary import with_ridge_ends
 
 if TYPE_CHECKING:
@@ -84,6 +84,16 @@ def ridges_away_from(
     return cut_around(
         wanted_ridges(samples, settings, wide), np.reshape(faults, (-1, 3)) - samples.origin, settings.length
     )
+
+
+def ridges_given_up(
+    faults: Sequence[Place], samples: SurfaceSamples, settings: Settings, wide: tuple[int, ...] = ()
+) -> list[np.ndarray]:
+    """Return the parts of ridges near faults that the grid is not to follow, the longest first, each (K, 3) [scan unit]."""
+    parts = given_up(
+        wanted_ridges(samples, settings, wide), np.reshape(faults, (-1, 3)) - samples.origin, settings.length
+    )
+    return [part + samples.origin for part in parts]
 
 
 def wanted_ridges(samples: SurfaceSamples, settings: Settings, wide: tuple[int, ...] = ()) -> list[Ridge]:

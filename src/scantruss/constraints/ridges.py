@@ -26,6 +26,7 @@ LEAST_REMAINDER = 2.0  # least length of what is left of such a ridge [member le
 AT_RIDGE = 0.75  # farthest that a ridge passes a place that names it [member lengths]
 ACUTE_RIDGE = np.radians(85.0)  # median fold from which on a ridge is acute
 LONGEST_BETWEEN_CORNERS = 1.8  # longest ridge that is looked for between two corners [member lengths]
+OVER_OPENING = 0.75  # step of a ridge above which it goes on behind an opening [member lengths]
 SHORTEST_RIDGE = 0.35  # shortest such ridge [member lengths]
 
 
@@ -119,17 +120,59 @@ def cut_around(ridges: list[Ridge], places: np.ndarray, length: float) -> list[R
     """Return the ridges without what lies near some places (M, 3), where no grid could follow them; parts that are too short go."""
     found = []
     for ridge in ridges:
-        away = np.linalg.norm(ridge.places[:, None] - places, axis=2).min(axis=1) if len(places) else np.ones(1)
-        if len(places) == 0 or away.min() > FAULT_REACH * length:
+        if (line := _opened_at(ridge, places, length)) is None:
             found.append(ridge)
-            continue
-        first = int(away.argmin()) if ridge.ring else 0
-        line, far = np.roll(ridge.places, -first, axis=0), np.roll(away, -first) > FAULT_REACH * length
-        for begin, end in runs(far):
-            part = line[begin:end]
-            if np.linalg.norm(np.diff(part, axis=0), axis=1).sum() >= LEAST_REMAINDER * length:
-                found.append(Ridge(part, ridge.sharp))
+        else:
+            found += [Ridge(line[begin:end], ridge.sharp) for begin, end in runs(_is_left(line, places, length))]
     return found
+
+
+def given_up(ridges: list[Ridge], places: np.ndarray, length: float) -> list[np.ndarray]:
+    """Return the parts (K, 3), the longest first, that `cut_around` leaves out, each up to where the ridge goes on or an opening lies."""
+    found = []
+    for ridge in ridges:
+        if (line := _opened_at(ridge, places, length)) is None:
+            continue
+        gone = ~_is_left(line, places, length)
+        if ridge.ring:  # from a place that is left on
+            first = int(gone.argmin())
+            line, gone = (np.concatenate([each[first:], each[: first + 1]]) for each in (line, gone))
+        for begin, end in runs(gone):
+            part = line[max(begin - 1, 0) : end + 1]
+            steps = np.linalg.norm(np.diff(part, axis=0), axis=1)
+            found += np.split(part, np.flatnonzero(steps > OVER_OPENING * length) + 1)
+    found.sort(key=length_along, reverse=True)
+    return [part for part in found if length_along(part) >= SHORTEST_RIDGE * length]
+
+
+def length_along(line: np.ndarray) -> float:
+    """Return the length of a polyline (K, 3)."""
+    return float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
+
+
+def _opened_at(ridge: Ridge, places: np.ndarray, length: float) -> np.ndarray | None:
+    """Return the places (K, 3) of a ridge that passes near some others (M, 3), a ring from the nearest on; None where it passes none."""
+    if not len(places):
+        return None
+    away = _distances(ridge.places, places)
+    first = int(away.argmin())
+    if away[first] > FAULT_REACH * length:
+        return None
+    return np.roll(ridge.places, -first, axis=0) if ridge.ring else ridge.places
+
+
+def _is_left(line: np.ndarray, places: np.ndarray, length: float) -> np.ndarray:
+    """Return which places of a line (K, 3) lie away from some others (M, 3), in parts that are long enough."""
+    left: np.ndarray = _distances(line, places) > FAULT_REACH * length
+    for begin, end in runs(left):
+        left[begin:end] = length_along(line[begin:end]) >= LEAST_REMAINDER * length
+    return left
+
+
+def _distances(line: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Return the distance of each place of a line (K, 3) from the nearest of some others (M, 3)."""
+    away: np.ndarray = np.linalg.norm(line[:, None] - places, axis=2).min(axis=1)
+    return away
 
 
 def without(ridges: list[Ridge], places: Sequence[np.ndarray], length: float) -> list[Ridge]:

@@ -148,6 +148,12 @@ class Certificate:
         """Share of the points of the file that settings left out, as by a crop, a class or a piece."""
         return sum(part.share for part in self.left_out if part.asked)
 
+    @property
+    def farthest_listed(self) -> LeftOut | None:
+        """The entry of what is left out that the point farthest from the grid belongs to; None where that is of no entry."""
+        largest = _largest(self.scan_distance)
+        return next((part for part in self.left_out if largest is not None and part.farthest == largest.value), None)
+
     def worst_places(self) -> list[tuple[str, Worst, bool]]:
         """Return the worst figures that are known: name, figure with its place, whether it is an angle [degree] or a length."""
         found = (
@@ -158,7 +164,11 @@ class Certificate:
             ("sharpest fold between triangles, 180 is level", self.sharpest_fold, True),
             ("node farthest from the scan", _largest(self.node_distance), False),
             ("triangle farthest from the scan", _largest(self.triangle_distance), False),
-            ("point farthest from the grid", _largest(self.scan_distance), False),
+            (
+                f"point farthest from the grid{', one left out' * bool(self.farthest_listed)}",
+                _largest(self.scan_distance),
+                False,
+            ),
             ("fixed node farthest from its position", self.fixed_error, False),
         )
         return [(name, worst, of_angle) for name, worst, of_angle in found if worst is not None]

@@ -185,7 +185,17 @@ def distance_lines(certificate: Certificate) -> list[str]:
         )
         if spread is not None
     ]
+    lines[:1] = [line + _of_left_out(certificate) for line in lines[:1]]
     return [*lines, f"points around nodes: {offset_words(certificate)}"]
+
+
+def _of_left_out(certificate: Certificate) -> str:
+    """Return what part of the points that are measured is listed as left out, where the farthest of them is of it; else nothing."""
+    of_it, spread = certificate.farthest_listed, certificate.scan_distance
+    if of_it is None or spread is None:
+        return ""
+    share = sum(part.points for part in certificate.left_out if part.farthest is not None) / certificate.points
+    return f"; {share:.2%} of them are listed as left out, the farthest among them: {of_it.words}{near(spread.largest.where)}"
 
 
 def offset_words(certificate: Certificate) -> str:

@@ -47,7 +47,8 @@ def result_of(trial: LengthTrial | None) -> str:
     found = trial.grid.certificate if trial.grid is not None else None
     if found is None:
         return "passes"
-    parts = ["passes with warnings" if found.warnings else "passes"]
+    count = len(found.warnings)
+    parts = [f"passes with {count} warning{'s' if count > 1 else ''}" if count else "passes"]
     shares: dict[str, float] = {}
     for part in found.left_out:
         if not part.asked and part.kind != "duplicates":
@@ -58,8 +59,9 @@ def result_of(trial: LengthTrial | None) -> str:
         if share >= 0.0005
     ]
     parts += [warning.words for warning in found.warnings if warning.kind == "sparse"]
-    holes = sum(part.kind == "hole" for part in found.left_out)
-    parts += [f"{holes} {'hole' if holes == 1 else 'holes'} closed"] * (holes > 0)
+    for kind, what in (("hole", "closed"), ("gap", "bridged")):
+        number = sum(part.number for part in found.left_out if part.kind == kind)
+        parts += [f"{number} {kind}{'s' if number > 1 else ''} {what}"] * (number > 0)
     return ", ".join(parts)
 
 

@@ -11,6 +11,9 @@ from ..scan.vectors import dots
 LEAST_TRIANGLES = 20.0  # fewest triangles of a piece that gets a grid
 TRIANGLE_AREA = 0.433  # area of a regular triangle [square of its side]
 LEAST_SHARE = 0.01  # least area of such a piece [area of the largest piece]
+SPACINGS_OF_CELL = (
+    4.0  # width of the cells by which pieces are ordered, so that no member length changes that [point spacings]
+)
 LEAST_SAMPLES = 12  # fewest samples of such a piece
 
 
@@ -32,24 +35,47 @@ def sample_areas(surface: Surface) -> np.ndarray:
     return np.where(count > 0, np.pi * reach / (count + 1), 0.0)
 
 
-def chosen_pieces(large: tuple[int, ...], wanted: str, floor: int | None) -> tuple[int, ...]:
-    """Return the large pieces that the settings choose: all but the floor, all, the largest, or some by their numbers from 1.
+def chosen_pieces(named: dict[int, int], wanted: str) -> tuple[int, ...]:
+    """Return the large pieces that the settings choose by the numbers that users give them, or the first of these as the largest.
+
+    named : large pieces by these numbers, see `SurfaceSamples.named_pieces`
 
     Raises
     ------
     InputError
-        There is no piece of that number.
+        There is no piece of that number, or it cannot carry a grid.
     """
-    if wanted in ("auto", "all"):
-        return tuple(number for number in large if number != floor)
-    numbers = [1] if wanted == "largest" else [int(word) for word in wanted.split(",")]
-    if max(numbers) > len(large):
-        choice = "1" if len(large) == 1 else f"a number up to {len(large)}"
+    numbers = [min(named)] if wanted == "largest" else [int(word) for word in wanted.split(",")]
+    if unknown := set(numbers) - set(named):
+        last = max(named)
+        up_to = "1" if last == 1 else f"a number up to {last}"
+        choice = up_to if len(named) == last else f"one of {', '.join(map(str, named))}"
         raise InputError(
-            f"piece {max(numbers)} is asked for, but the scan has {len(large)} that can carry a grid;"
+            f"piece {max(unknown)} is asked for, but the scan has {len(named)} that can carry a grid;"
             f" choose {choice}, largest or all, or --no-keep-rods to part pieces that poles or cables join"
         )
-    return tuple(large[number - 1] for number in sorted(set(numbers)))
+    return tuple(sorted({named[number] for number in numbers}))
+
+
+def places_to_count(points: np.ndarray, spacing: float) -> np.ndarray:
+    """Return one of the points (N, 3) in each cell of a few spacings, (M, 3): as many as the area that they cover."""
+    cells = np.floor(points / (SPACINGS_OF_CELL * spacing)).astype(np.int64)
+    cells -= cells.min(axis=0)
+    across = cells.max(axis=0) + 1
+    first = np.unique((cells[:, 0] * across[1] + cells[:, 1]) * across[2] + cells[:, 2], return_index=True)[1]
+    return points[first]
+
+
+def by_size(owner: np.ndarray, places: np.ndarray, piece: np.ndarray) -> list[int]:
+    """Return the pieces, that of the largest area first, of as large ones that which lies lowest in x, y, z.
+
+    owner : (M,) sample of each of `places_to_count`, -1 where none is near; places, piece : (S, 3), (S,) of the samples
+    """
+    low = np.full((int(piece.max()) + 1, 3), np.inf)
+    np.minimum.at(low, piece, places)
+    cells = np.bincount(piece[owner[owner >= 0]], minlength=len(low))
+    order: list[int] = np.lexsort((*low.T[::-1], -cells)).tolist()
+    return order
 
 
 def large_pieces(piece: np.ndarray, area: np.ndarray, graded: np.ndarray, length: float) -> tuple[int, ...]:

@@ -38,7 +38,7 @@ from .given_normals import GivenNormals, given_normals
 from .limbs import LimbRing, cut_limbs
 from .linked_samples import LINKED_POINTS_PER_THREAD, PATCH_SPACING, Linked, group, link_samples
 from .owners import owners_of
-from .pieces import chosen_pieces, large_pieces, number_pieces, sample_areas
+from .pieces import by_size, chosen_pieces, large_pieces, number_pieces, places_to_count, sample_areas
 from .rods import lengths_of_rods, pieces_of_rods, rod_points
 from .shape import check_is_surface, layers_of_surface
 from .size_field import length_field
@@ -113,6 +113,14 @@ class SurfaceSamples:
     def kept(self) -> np.ndarray:
         """Which samples are of pieces that get a grid (S,) bool."""
         return np.isin(self.piece, self.pieces)
+
+    @cached_property
+    def named_pieces(self) -> dict[int, int]:
+        """The pieces large enough for a grid by the numbers that users give them: by area, and no member length changes them."""
+        owner = owners_of(self, places_to_count(self.scan, self.spacing))
+        large = {*self.pieces, *self.not_chosen}
+        ordered = enumerate(by_size(owner, self.surface.mean, self.piece), 1)
+        return {number: piece for number, piece in ordered if piece in large}
 
     @cached_property
     def elsewhere(self) -> np.ndarray:
@@ -334,8 +342,8 @@ def _prepare(
     graded = area / surface.field**2
     large = large_pieces(piece, area, graded, length)
     floor = find_floor(surface.mean, piece, large, length) if asked.piece == "auto" and asked.z_is_up else None
-    pieces = chosen_pieces(large, asked.piece, floor)
-    return SurfaceSamples(
+    pieces = tuple(number for number in large if number != floor)
+    samples = SurfaceSamples(
         surface,
         found.boxes,
         piece,
@@ -359,6 +367,10 @@ def _prepare(
         given=given,
         rings=rings,
     )
+    if asked.piece in ("auto", "all"):
+        return samples
+    pieces = chosen_pieces(samples.named_pieces, asked.piece)
+    return replace(samples, pieces=pieces, not_chosen=tuple(sorted(set(large) - set(pieces))))
 
 
 def _faced(chosen: ChosenSamples, spacing: float, asked: Asked) -> tuple[Surface, np.ndarray, np.ndarray]:

@@ -8,6 +8,7 @@ import numpy as np
 
 from ...errors import FormatError, InputError
 from ...runtime.files import SaveTogether
+from ...runtime.ours import FORCE_ARGUMENT, check_ours
 from ...runtime.places import check_place
 from ..units import check_unit
 from .content import Cloud
@@ -23,6 +24,7 @@ def write_points(
     normals: np.ndarray | None = None,
     unit: str = "",
     origin: np.ndarray | None = None,
+    force: bool = False,
 ) -> None:
     """Write a cloud to exactly this path, whole or not at all; the format is that of the suffix.
 
@@ -36,11 +38,14 @@ def write_points(
     unit : written if the format can hold it; text files hold it in their column names (CSV) or in a comment
     origin : (3,) array, optional
         A place near the points, from which LAS counts.
+    force : bool
+        Whether to write over a file that is not known as a cloud by ScanTruss. CSV and NPY files have no place for a mark, so even
+        those that ScanTruss wrote are replaced by force only.
 
     Raises
     ------
     FormatError
-        No writer for the suffix, or the file cannot be written.
+        No writer for the suffix, or the file cannot be written; or one is there that is not known as ours.
     InputError
         Arrays of wrong shape, no points, or not finite.
     """
@@ -50,6 +55,8 @@ def write_points(
     if cloud.normals is not None and len(cloud.normals) != len(cloud.points):
         raise InputError(f"{len(cloud.points):,} points need as many normals, got {len(cloud.normals):,}")
     check_unit(unit)
+    if not force:
+        check_ours(path, "cloud", FORCE_ARGUMENT)
     try:
         with SaveTogether() as save:
             writer(save.beside(path), cloud)
