@@ -72,25 +72,24 @@ def energy_of(net: QuadNet, quads: np.ndarray, share: np.ndarray, lengths: float
 
 
 @kernel
-def _quads_after(net: QuadNet, ids: np.ndarray, changed: np.ndarray, corners: np.ndarray) -> np.ndarray:
-    """Return the quads (R, 4) that stand for some (N,) where others replace a part of them; parameters as of `try_quads`."""
-    after, row = np.empty((len(ids) + len(changed), 4), np.int64), 0
+def _quads_after(net: QuadNet, ids: np.ndarray, changed: np.ndarray, corners: np.ndarray, after: np.ndarray) -> int:
+    """Put the quads into `after` that stand for some (N,) where others replace a part of them; return how many. See `try_quads`."""
+    row = 0
     for i in range(len(ids)):
         other = -1
         for k in range(len(changed)):
             if changed[k] == ids[i]:
                 other = k
-        if other < 0:
-            after[row] = net.quads[ids[i]]
+        if other < 0 or corners[other, 0] >= 0:
+            for k in range(4):
+                after[row, k] = net.quads[ids[i], k] if other < 0 else corners[other, k]
             row += 1
-        elif corners[other, 0] >= 0:
-            after[row] = corners[other]
+    for i in range(len(changed)):
+        if net.quads[changed[i], 0] < 0 and corners[i, 0] >= 0:
+            for k in range(4):
+                after[row, k] = corners[i, k]
             row += 1
-    for k in range(len(changed)):
-        if net.quads[changed[k], 0] < 0 and corners[k, 0] >= 0:
-            after[row] = corners[k]
-            row += 1
-    return after[:row]
+    return row
 
 
 @kernel
@@ -149,8 +148,9 @@ def try_quads(
     if count < 0:
         return np.inf, 0
     before = net.quads[ids[:count]]
-    after = _quads_after(net, ids[:count], changed, corners)
-    row = len(after)
+    after = np.empty((count + len(changed), 4), np.int64)
+    row = _quads_after(net, ids[:count], changed, corners, after)
+    after = after[:row]
     around = _keep_nodes(net, before, places, old)
     share = np.empty((count, 4))
     shares_of(before, at_boundary, share)
