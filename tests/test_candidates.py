@@ -287,6 +287,27 @@ def test_best_is_no_worse_than_normal_and_takes_part_only_where_that_passes(
     assert found.p95 <= theirs.p95 and found.p99 <= theirs.p99
 
 
+@compiled_only
+def test_a_grid_with_ridges_is_searched_on_and_is_in_no_figure_worse() -> None:
+    gable = make("gable", 20_000)
+    cloud, settings = st.PointCloud.from_array(gable.points), st.Settings(length=1.4 * gable.length)
+    usual, even = (pipeline.make_grid(cloud, Attempt(settings, is_evened=evened)) for evened in (False, True))
+    theirs, found = (known(known(grid.certificate).scan_distance) for grid in (usual, even))
+    assert len(even.lines) > 0 and known(even.certificate).passed
+    assert even.quality.length_cv < usual.quality.length_cv and even.quality.shape_mean >= usual.quality.shape_mean
+    assert found.p95 <= theirs.p95 and found.p99 <= theirs.p99
+    quick = settings.replace(effort="quick")
+    usual, even = (pipeline.make_grid(cloud, Attempt(quick, is_evened=evened)) for evened in (False, True))
+    assert usual.nodes.tobytes() == even.nodes.tobytes()
+
+
+@compiled_only
+def test_a_grid_without_ridges_is_not_searched_on(shape: Shape) -> None:
+    cloud, settings = st.PointCloud.from_array(shape.points), st.Settings(length=1.4 * shape.length)
+    usual, even = (pipeline.make_grid(cloud, Attempt(settings, is_evened=evened)) for evened in (False, True))
+    assert len(usual.lines) == 0 and usual.nodes.tobytes() == even.nodes.tobytes()
+
+
 def test_fronts_that_would_all_miss_the_same_limbs_are_not_tried() -> None:
     attempt = next(attempts(st.PointCloud.from_array(sheet(8.0, 8.0, 0.25)), st.Settings(length=1.0)))
 

@@ -13,6 +13,7 @@ from .front.advance import advance_front
 from .front.orientation_field import Field, orientation_fields
 from .improve.candidate import Candidate, grid_of, judged, misses_at_most
 from .improve.optimize import improve_first, improve_last, searched_again
+from .improve.perturbation import BESIDE_RIDGES
 from .improve.tip_search import MOST_MISSED, reach_tips_of
 from .runtime.parallel import threaded_map
 from .runtime.progress import Progress, WatchedProgress, seer_of
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 FULLY_IMPROVED = {"quick": 1, "normal": 1, "best": 3}  # fronts that are improved to the end
 MISSED_MORE = 0.002  # share of the scan that the grid of a longer search may miss beyond that of a shorter one
 TURNS_OF_SEARCH = 12  # times that the grid of effort `normal` is searched again where none of `best` is better
+TURNS_BESIDE_RIDGES = 6  # times that it is searched again in any case where it follows ridges
 FINALIST_BATCHES = 2  # times that finalists are tried
 
 
@@ -112,11 +114,13 @@ def best_that_passes(
     settings: Settings,
     *,
     is_trial: bool = False,
+    is_evened: bool = True,
     progress: Progress | None = None,
 ) -> Grid:
     """Improve the first candidates to the end, check them, and return the best that passes, with its certificate.
 
     is_trial : a grid that passes is left as it is, without nodes on the tips of the scan
+    is_evened : a grid of effort `normal` is searched on where it follows ridges
 
     Raises
     ------
@@ -126,7 +130,10 @@ def best_that_passes(
     if settings.effort == "best" and settings.method == "default":
         return no_worse(candidates, samples, boundary, constraints, settings, progress=progress)
     passed = those_that_pass(candidates, samples, boundary, constraints, settings, is_trial=is_trial, progress=progress)
-    return grid_of(chosen(passed))
+    best = chosen(passed)
+    if settings.effort == "normal" and is_evened and not is_trial:
+        even_out_ridges(best, samples, boundary, constraints, settings)
+    return grid_of(best)
 
 
 def those_that_pass(
@@ -199,6 +206,7 @@ def no_worse(
     fronts = advance_fronts(samples, boundary, constraints, fields, lower)
     improved = improve_fronts(fronts, samples, boundary, constraints, lower)
     usual = chosen(those_that_pass(improved, samples, boundary, constraints, lower))
+    even_out_ridges(usual, samples, boundary, constraints, lower)
     better = []
     with suppress(FrontError):
         passed = those_that_pass(candidates, samples, boundary, constraints, settings, progress=progress)
@@ -209,13 +217,26 @@ def no_worse(
     return grid_of(usual).replace(settings=settings)
 
 
-def search_on(
+def even_out_ridges(
     candidate: Candidate, samples: SurfaceSamples, boundary: Boundary, constraints: Constraints, settings: Settings
 ) -> None:
+    """Search a grid that passes on where it follows ridges: beside them the usual search leaves most of its irregular nodes."""
+    if candidate.mesh.sharp.any():
+        search_on(candidate, samples, boundary, constraints, settings, TURNS_BESIDE_RIDGES)
+
+
+def search_on(
+    candidate: Candidate,
+    samples: SurfaceSamples,
+    boundary: Boundary,
+    constraints: Constraints,
+    settings: Settings,
+    turns: int = TURNS_OF_SEARCH,
+) -> None:
     """Search a grid that passes again and again, and take the most even one that is in no figure worse than it was."""
-    usual = grid_of(candidate)
-    for _ in range(TURNS_OF_SEARCH):
-        grid = searched_again(candidate.mesh, candidate.front, samples, constraints, candidate.settings)
+    usual, way = grid_of(candidate), BESIDE_RIDGES if candidate.mesh.sharp.any() else "normal"
+    for _ in range(turns):
+        grid = searched_again(candidate.mesh, candidate.front, samples, constraints, candidate.settings, way)
         now = judged(grid, samples, boundary, settings)
         grid = now.checked_grid
         passes = now.certificate.passed and _is_no_worse(grid, usual)

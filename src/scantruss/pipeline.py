@@ -24,6 +24,7 @@ from .constraints.find import find_constraints, wide_folds
 from .errors import CertificateError, FrontError, ScanTrussError
 from .front.orientation_field import orientation_fields
 from .grid.grid import Grid
+from .grid.line_sets import RIDGE
 from .runtime.progress import Progress, seer_of
 from .scan.cloud import PointCloud
 from .scan.member_length import check_length
@@ -145,7 +146,14 @@ def make_grid(cloud: PointCloud, attempt: Attempt, *, progress: Progress | None 
     fronts = advance_fronts(samples, boundary, constraints, fields, settings, progress=progress)  # Fig. 4
     improved = improve_fronts(fronts, samples, boundary, constraints, settings, progress=progress)  # Sec. 4.1
     best = best_that_passes(
-        improved, samples, boundary, constraints, settings, is_trial=attempt.is_trial, progress=progress
+        improved,
+        samples,
+        boundary,
+        constraints,
+        settings,
+        is_trial=attempt.is_trial,
+        is_evened=attempt.is_evened,
+        progress=progress,
     )  # certificate
     return with_cells(best, samples, boundary, constraints, wanted, progress=progress)  # quads, hexagons
 
@@ -153,7 +161,8 @@ def make_grid(cloud: PointCloud, attempt: Attempt, *, progress: Progress | None 
 def make_grid_with_wide_ridges(cloud: PointCloud, attempt: Attempt, *, progress: Progress | None = None) -> Grid:
     """Return the grid of one attempt; where it cuts off the crests of wide folds, with ridges there, if that follows the scan better.
 
-    For effort `best` grids of effort `normal` decide it, so that the longer search starts from no worse.
+    Grids of effort `normal` that are not evened out beside ridges decide it also for effort `best`, so that longer searches start from
+    no worse.
 
     Raises
     ------
@@ -167,15 +176,21 @@ def make_grid_with_wide_ridges(cloud: PointCloud, attempt: Attempt, *, progress:
         return make_grid(cloud, attempt, progress=progress)
     is_long = attempt.settings.effort == "best"
     seen = _unseen(progress) if is_long else progress
-    first = replace(attempt, settings=attempt.settings.replace(effort="normal")) if is_long else attempt
+    lower = attempt.settings.replace(effort="normal") if is_long else attempt.settings
+    first = replace(attempt, settings=lower, is_evened=False)
+
+    def made_in_full(grid: Grid, wide: tuple[int, ...]) -> Grid:
+        is_whole = not is_long and (lower.effort == "quick" or not any(each.kind == RIDGE for each in grid.line_sets))
+        return grid if is_whole else make_grid(cloud, replace(attempt, wide=wide), progress=progress)
+
     plain = make_grid(cloud, first, progress=seen)
     wide = crests_cut_off(plain, crests, settings.length)
     if wide:
         with suppress(FrontError):
             folded = make_grid(cloud, replace(first, wide=wide), progress=seen)
             if follows_better(folded, plain):
-                return make_grid(cloud, replace(attempt, wide=wide), progress=progress) if is_long else folded
-    return make_grid(cloud, attempt, progress=progress) if is_long else plain
+                return made_in_full(folded, wide)
+    return made_in_full(plain, ())
 
 
 def _unseen(progress: Progress | None) -> Progress | None:

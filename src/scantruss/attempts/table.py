@@ -53,6 +53,7 @@ class Attempt:
     faults: tuple[tuple[float, float, float], ...] = ()  #: places at which ridges are given up [scan unit]
     wide: tuple[int, ...] = ()  #: numbers of the wide folds that are ridges too, see `constraints.ridges.find_ridges`
     is_trial: bool = False  #: whether all that counts is that a grid passes
+    is_evened: bool = True  #: whether a grid of effort `normal` is searched on where it follows ridges
     row: str = AS_ASKED  #: name of its row in the table
 
     def after(self, fault: FrontError, cloud: PointCloud) -> Attempt | None:
