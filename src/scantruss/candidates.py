@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 FULLY_IMPROVED = {"quick": 1, "normal": 1, "best": 3}  # fronts that are improved to the end
 MISSED_MORE = 0.002  # share of the scan that the grid of a longer search may miss beyond that of a shorter one
 TURNS_OF_SEARCH = 12  # times that the grid of effort `normal` is searched again where none of `best` is better
+LEAST_EVENED = 0.001  # fall of the variation of the lengths that is worth another grid there
 TURNS_BESIDE_RIDGES = 6  # times that it is searched again in any case where it follows ridges
 FINALIST_BATCHES = 2  # times that finalists are tried
 
@@ -222,7 +223,10 @@ def even_out_ridges(
 ) -> None:
     """Search a grid that passes on where it follows ridges: beside them the usual search leaves most of its irregular nodes."""
     if candidate.mesh.sharp.any():
+        usual, grid = candidate.judged, grid_of(candidate)
         search_on(candidate, samples, boundary, constraints, settings, TURNS_BESIDE_RIDGES)
+        if grid.quality.length_cv - grid_of(candidate).quality.length_cv < LEAST_EVENED:
+            candidate.judged, candidate.grid = usual, grid
 
 
 def search_on(
