@@ -9,7 +9,8 @@ import numpy as np
 
 from scantruss import Grid
 from scantruss.grid.quality import shape_qualities
-from scantruss.improve.equalize import LENGTH_WEIGHT, MEAN_LENGTH_WEIGHT
+from scantruss.improve.equalize import MEAN_LENGTH_WEIGHT
+from scantruss.improve.working_mesh import LENGTH_WEIGHT
 
 
 def shape(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> float:

@@ -19,11 +19,16 @@ import scantruss as st
 from scantruss import candidates, pipeline
 from scantruss.attempts.limit import MOST_RUNS, AttemptLimit
 from scantruss.attempts.table import FRONT_LENGTHS, SMOOTHING_SCALES, Attempt, attempts
+from scantruss.boundary.find import find_boundary
 from scantruss.check.certify import Judged, judge
+from scantruss.constraints.find import find_constraints
 from scantruss.errors import CertificateError, FrontError
+from scantruss.front.orientation_field import orientation_fields
+from scantruss.improve.candidate import grid_of as grid_of_candidate
 from scantruss.improve.optimize import improve_last
 from scantruss.runtime import parallel
 from scantruss.scan.formats.writing import write_points
+from scantruss.surface.samples import sample_surface
 
 
 @pytest.fixture(scope="module")
@@ -284,6 +289,25 @@ def test_best_is_no_worse_than_normal_and_takes_part_only_where_that_passes(
     found, theirs = known(known(grid.certificate).scan_distance), known(known(usual.certificate).scan_distance)
     assert grid.settings == settings and known(grid.certificate).passed
     assert grid.quality.length_cv <= usual.quality.length_cv and grid.quality.shape_mean >= usual.quality.shape_mean
+    assert found.p95 <= theirs.p95 and found.p99 <= theirs.p99
+
+
+@compiled_only
+def test_a_grid_with_ridges_is_searched_on_and_is_in_no_figure_worse() -> None:
+    gable = make("gable", 20_000)
+    settings = st.Settings(length=1.4 * gable.length)
+    samples, boundary = find_boundary(sample_surface(st.PointCloud.from_array(gable.points), settings), settings)
+    boundary, constraints = find_constraints(samples, boundary, settings)
+    fields = orientation_fields(samples, boundary, settings)
+    fronts = candidates.advance_fronts(samples, boundary, constraints, fields, settings)
+    improved = candidates.improve_fronts(fronts, samples, boundary, constraints, settings)
+    best = candidates.chosen(candidates.those_that_pass(improved, samples, boundary, constraints, settings))
+    usual = grid_of_candidate(best)
+    candidates.even_out_ridges(best, samples, boundary, constraints, settings)
+    even = grid_of_candidate(best)
+    theirs, found = (known(known(grid.certificate).scan_distance) for grid in (usual, even))
+    assert len(even.lines) > 0 and known(even.certificate).passed
+    assert even.quality.length_cv < usual.quality.length_cv and even.quality.shape_mean >= usual.quality.shape_mean
     assert found.p95 <= theirs.p95 and found.p99 <= theirs.p99
 
 

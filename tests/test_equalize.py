@@ -13,7 +13,6 @@ from typed import known, xyz
 
 from scantruss.improve.equalize import (
     LAST_RELAXATION,
-    LENGTH_WEIGHT,
     MEAN_LENGTH_WEIGHT,
     equalize,
     finish,
@@ -21,7 +20,7 @@ from scantruss.improve.equalize import (
     search_once,
     settle,
 )
-from scantruss.improve.working_mesh import WorkingMesh
+from scantruss.improve.working_mesh import LENGTH_WEIGHT, WorkingMesh
 from scantruss.kernels.boundary import curves
 from scantruss.kernels.mesh import equalize as kernels
 from scantruss.kernels.mesh import local_search

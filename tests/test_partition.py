@@ -9,6 +9,7 @@ from rough import Rough, rough_disc, rough_sphere, same_topology
 
 from scantruss.improve import equalize, perturbation
 from scantruss.improve.partition import Partition
+from scantruss.improve.working_mesh import LENGTH_WEIGHT
 from scantruss.kernels.mesh.grid import Net
 from scantruss.kernels.mesh.partition import BETWEEN_PARTS
 from scantruss.runtime import parallel
@@ -113,7 +114,7 @@ def test_parts_settle_as_well_as_the_whole(
     for many in (50, 10_000):
         mesh = make(seed).mesh()
         monkeypatch.setattr(equalize, "NODES_SETTLED_IN_PARTS", many)
-        sweeps.append(equalize.settle(mesh, equalize.LENGTH_WEIGHT, 1e-7, 400))
+        sweeps.append(equalize.settle(mesh, LENGTH_WEIGHT, 1e-7, 400))
         energies.append(equalize.energy_of_node(mesh))
     assert max(sweeps) < 400
     assert energies[0] == pytest.approx(energies[1], rel=0.01)
@@ -123,7 +124,7 @@ def test_what_lies_between_is_searched_after_the_parts(
     make: Callable[..., Rough], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     mesh = in_independent_sets(make, monkeypatch, 2).mesh()
-    equalize.settle(mesh, equalize.LENGTH_WEIGHT, 1e-3, 20)
+    equalize.settle(mesh, LENGTH_WEIGHT, 1e-3, 20)
     net, scratch = mesh.net, equalize.new_scratch(mesh)
     seen, run = [], Partition.run
 
@@ -156,7 +157,7 @@ def test_perturbations_in_parts_lead_to_the_same_grid_on_any_machine(
         monkeypatch.setattr(perturbation, "NODES_OF_LARGE_GRID", 100)
         rough = make(1)
         mesh = rough.mesh()
-        equalize.settle(mesh, equalize.LENGTH_WEIGHT, 1e-3, 20)
+        equalize.settle(mesh, LENGTH_WEIGHT, 1e-3, 20)
         before = equalize.energy_of_node(mesh)
         perturbation.search_widely(mesh, "normal")
         assert equalize.energy_of_node(mesh) < before
@@ -170,7 +171,7 @@ def test_what_lies_between_stays_while_the_parts_are_perturbed(
     make: Callable[..., Rough], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     mesh = make(2).mesh()
-    equalize.settle(mesh, equalize.LENGTH_WEIGHT, 1e-3, 20)
+    equalize.settle(mesh, LENGTH_WEIGHT, 1e-3, 20)
     net = mesh.net
     names, seen, run = ("nodes", "ring", "degree"), [], Partition.run
 

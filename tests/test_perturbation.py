@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from rough import Rough, rough_disc, rough_sphere, same_topology
 
-from scantruss.improve.equalize import LENGTH_WEIGHT, MEAN_LENGTH_WEIGHT, energy_of_node, new_scratch, settle
+from scantruss.improve.equalize import MEAN_LENGTH_WEIGHT, energy_of_node, new_scratch, settle
 from scantruss.improve.perturbation import new_area, search_widely
-from scantruss.improve.working_mesh import WorkingMesh
+from scantruss.improve.working_mesh import LENGTH_WEIGHT, WorkingMesh
 from scantruss.kernels.mesh import perturbation as kernels
 from scantruss.kernels.mesh.grid import LOCKED, Net
 from scantruss.kernels.mesh.perturbation import Area

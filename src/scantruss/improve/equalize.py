@@ -25,8 +25,7 @@ from .flips import flip_edges
 from .partition import Partition
 from .working_mesh import NEAR_IN_THE_END, WorkingMesh
 
-LENGTH_WEIGHT = 1.0  # weight of the lengths of members against the shapes of triangles
-# the same in the last sweeps, for each value of `prefer`
+# weight of the lengths of members against the shapes of triangles in the last sweeps, for each value of `prefer`
 LAST_LENGTH_WEIGHT = {"balance": 3.0, "lengths": 8.0, "shapes": 0.5}
 LAST_SWEEPS = (12, 6)  # most sweeps in each of the last rounds; patches are fitted again before each round
 LAST_RELAXATION = 1.75  # over-relaxation of the last sweeps, which evens out long waves (successive over-relaxation)
@@ -104,7 +103,7 @@ def settle(
 def settle_again(mesh: WorkingMesh) -> None:
     """Settle after a round of moves, in which nodes have left the centres of their patches."""
     mesh.renew(FARTHEST_ON_THE_WAY)
-    settle(mesh, LENGTH_WEIGHT, 1e-4, 8)
+    settle(mesh, mesh.length_weight, 1e-4, 8)
 
 
 def search_once(mesh: WorkingMesh, scratch: Scratch) -> int:
@@ -135,7 +134,7 @@ def _search_partition(mesh: WorkingMesh, partition: Partition, scratch: Scratch)
 
 def _search(mesh: WorkingMesh, net: Net, scratch: Scratch, terms: Terms) -> int:
     of_grid = mesh.patches, mesh.curves, scratch, mesh.length
-    return search_moves(net, *of_grid, LENGTH_WEIGHT, terms.strain, MEAN_LENGTH_WEIGHT, terms.share, terms.nodes)
+    return search_moves(net, *of_grid, mesh.length_weight, terms.strain, MEAN_LENGTH_WEIGHT, terms.share, terms.nodes)
 
 
 class Terms(NamedTuple):
@@ -148,25 +147,25 @@ class Terms(NamedTuple):
 
 def terms_of(mesh: WorkingMesh, scratch: Scratch) -> Terms:
     """Return the terms for a whole grid as it is now."""
-    energy, mean, count = total_energy(mesh.net, mesh.patches, scratch, mesh.length, LENGTH_WEIGHT)
+    energy, mean, count = total_energy(mesh.net, mesh.patches, scratch, mesh.length, mesh.length_weight)
     return Terms(mean / mesh.length - 1.0, min(energy / max(count, 1), LARGEST_SHARE), max(count, 1))
 
 
 def energy_of_grid(mesh: WorkingMesh, scratch: Scratch) -> float:
     """Return the energy of an opened grid with the usual weight of the lengths."""
-    return float(total_energy(mesh.net, mesh.patches, scratch, mesh.length, LENGTH_WEIGHT)[0])
+    return float(total_energy(mesh.net, mesh.patches, scratch, mesh.length, mesh.length_weight)[0])
 
 
 def energy_of_node(mesh: WorkingMesh) -> float:
     """Return the energy of an opened grid per node, which compares grids with different numbers of nodes."""
-    energy, mean, count = total_energy(mesh.net, mesh.patches, new_scratch(mesh), mesh.length, LENGTH_WEIGHT)
+    energy, mean, count = total_energy(mesh.net, mesh.patches, new_scratch(mesh), mesh.length, mesh.length_weight)
     return energy / max(count, 1) + MEAN_LENGTH_WEIGHT * (mean / mesh.length - 1.0) ** 2
 
 
 def equalize(mesh: WorkingMesh, progress: Callable[[float], None] | None = None) -> None:
     """Flip, settle and search until no move is kept: the default way to improve a grid."""
     flip_edges(mesh.net)
-    settle(mesh, LENGTH_WEIGHT, 1e-3, 60)
+    settle(mesh, mesh.length_weight, 1e-3, 60)
     scratch = new_scratch(mesh)
     for done in range(LOCAL_SEARCH_ROUNDS):
         if progress:

@@ -11,7 +11,7 @@ from ..kernels.mesh.point_location import nearest_sample
 from ..kernels.mesh.trial import Scratch
 from ..surface.near_scan import place_text
 from ..surface.samples import local_field
-from .equalize import FARTHEST_ON_THE_WAY, LENGTH_WEIGHT, energy_of_grid, new_scratch, search_once, settle
+from .equalize import FARTHEST_ON_THE_WAY, energy_of_grid, new_scratch, search_once, settle
 from .working_mesh import WorkingMesh
 
 # distance from the boundary up to which a fixed node becomes a boundary node [member lengths]
@@ -145,7 +145,13 @@ def take_place(
     scratch.tried[nodes_around(net, v, RINGS_SEARCHED)] = 0
     for _ in range(3):
         mesh.renew(FARTHEST_ON_THE_WAY)
-        settle(mesh, LENGTH_WEIGHT, 1e-3, 6, independent_sets=[nodes_around(net, v, RINGS_SETTLED)] if around else None)
+        settle(
+            mesh,
+            mesh.length_weight,
+            1e-3,
+            6,
+            independent_sets=[nodes_around(net, v, RINGS_SETTLED)] if around else None,
+        )
         if search_once(mesh, scratch) == 0:
             break
 

@@ -14,7 +14,7 @@ from ..kernels.mesh.figures import angles_of_triangles, folds_of
 from ..kernels.mesh.grid import list_triangles
 from ..kernels.mesh.local_search import COLLAPSE, FLIP, SPLIT, is_allowed, make_move
 from ..kernels.mesh.trial import Scratch, gather
-from .equalize import LENGTH_WEIGHT, energy_of_grid, new_scratch, settle
+from .equalize import energy_of_grid, new_scratch, settle
 from .fixed_nodes import RINGS_SETTLED, nodes_around
 from .working_mesh import WorkingMesh
 
@@ -113,7 +113,7 @@ def _mend(
         gather(mesh.net, scratch, a, b)
         added = make_move(mesh.net, mesh.patches, mesh.curves, scratch, move, a, b)
         near = nodes_around(mesh.net, added if added >= 0 else a, RINGS_SETTLED)
-        settle(mesh, LENGTH_WEIGHT, 1e-4, SWEEPS_OF_TRIAL, independent_sets=[near])
+        settle(mesh, mesh.length_weight, 1e-4, SWEEPS_OF_TRIAL, independent_sets=[near])
         faults = poor_places(mesh, settings).faults
         if faults < least and energy_of_grid(mesh, scratch) < most:
             best, least = mesh.copied(), faults

@@ -17,7 +17,7 @@ from .fixed_nodes import fix_nearest_nodes, fix_nodes, hold_nodes
 from .flips import flip_edges
 from .mend import mend_poor_places
 from .off_scan import put_on_scan
-from .perturbation import search_widely
+from .perturbation import BESIDE_RIDGES, search_widely
 from .sliding_nodes import with_boundary_members, with_line_sets
 from .smoothing import smooth
 from .working_mesh import WorkingMesh
@@ -135,10 +135,16 @@ def improve_last(
 
 
 def searched_again(
-    mesh: WorkingMesh, front: Grid, samples: SurfaceSamples, constraints: Constraints, settings: Settings
+    mesh: WorkingMesh,
+    front: Grid,
+    samples: SurfaceSamples,
+    constraints: Constraints,
+    settings: Settings,
+    way: str = "normal",
 ) -> Grid:
-    """Return the grid of a mesh that was put down, searched again as with effort `normal`, as new nodes leave others uneven."""
-    search_widely(mesh, "normal")
+    """Return the grid of a mesh that was put down, searched again in a way of `PERTURBATIONS`, as new nodes leave others uneven."""
+    mesh = mesh.beside_ridges() if way == BESIDE_RIDGES else mesh
+    search_widely(mesh, way)
     return put_down(mesh, front, samples, constraints, settings)
 
 

@@ -17,9 +17,11 @@ from ..kernels.mesh.perturbation import (
     perturb_all,
 )
 from ..kernels.mesh.trial import Scratch
-from .equalize import FARTHEST_ON_THE_WAY, LENGTH_WEIGHT, MEAN_LENGTH_WEIGHT, Terms, new_scratch, settle_again, terms_of
+from .equalize import FARTHEST_ON_THE_WAY, MEAN_LENGTH_WEIGHT, Terms, new_scratch, settle_again, terms_of
 from .partition import Partition
 from .working_mesh import WorkingMesh
+
+BESIDE_RIDGES = "beside ridges"  # the way to search a grid on that follows ridges
 
 
 class Annealing(NamedTuple):
@@ -29,7 +31,12 @@ class Annealing(NamedTuple):
     temperature: float  #: energy that a perturbation may cost in the first round, on average
 
 
-PERTURBATIONS = {"quick": Annealing(0, 0.0), "normal": Annealing(6, 0.0), "best": Annealing(40, 0.2)}  # for each effort
+PERTURBATIONS = {  # for each effort, and for the search after it beside ridges
+    "quick": Annealing(0, 0.0),
+    "normal": Annealing(6, 0.0),
+    "best": Annealing(40, 0.2),
+    BESIDE_RIDGES: Annealing(8, 0.2),
+}
 NODES_OF_LARGE_GRID = 700  # nodes above which `normal` perturbs once, in parts: there the boundary matters little
 MOST_PARTITIONS = 2  # most times that a large grid is perturbed in parts
 IRREGULAR_NODES_FOR_PARTS = 12  # fewest irregular nodes for that
@@ -57,15 +64,16 @@ def new_area(mesh: WorkingMesh, number: int = 0) -> Area:
     )
 
 
-def search_widely(mesh: WorkingMesh, effort: str, progress: Callable[[float], None] | None = None) -> None:
+def search_widely(mesh: WorkingMesh, way: str, progress: Callable[[float], None] | None = None) -> None:
     """Perturb the grid at its irregular nodes, search from there, and keep what lowers the energy.
 
-    With `best` it may rise a little at first, and less and less later on (simulated annealing).
+    way : of `PERTURBATIONS`; with `best` and beside ridges the energy may rise a little at first, and less and less later on
+        (simulated annealing)
     """
-    rounds, temperature = PERTURBATIONS[effort]
+    rounds, temperature = PERTURBATIONS[way]
     if not rounds:
         return
-    if effort == "normal" and mesh.net.used > NODES_OF_LARGE_GRID:
+    if way == "normal" and mesh.net.used > NODES_OF_LARGE_GRID:
         perturb_in_parts(mesh)
     else:
         room = new_scratch(mesh), new_area(mesh)
@@ -117,5 +125,13 @@ def perturb_mesh(
     """Perturb a net of the grid once at each waiting irregular node (C,) bool; see `kernels.mesh.perturbation.perturb_all`."""
     of_grid = mesh.patches, mesh.curves, *room, waiting, mesh.length
     perturb_all(
-        net, *of_grid, LENGTH_WEIGHT, terms.strain, MEAN_LENGTH_WEIGHT, terms.share, terms.nodes, temperature, allowance
+        net,
+        *of_grid,
+        mesh.length_weight,
+        terms.strain,
+        MEAN_LENGTH_WEIGHT,
+        terms.share,
+        terms.nodes,
+        temperature,
+        allowance,
     )

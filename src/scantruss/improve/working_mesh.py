@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -23,6 +23,9 @@ from ..surface.scratch import with_own_scratch
 from .sliding_nodes import find_on_lines, inner_lines, joined
 
 NEAR_IN_THE_END = 0.25  # largest distance of a node from the centre of its patch in the end [member lengths]
+LENGTH_WEIGHT = 1.0  # weight of the lengths of members against the shapes of triangles
+WEIGHT_BESIDE_RIDGES = 3.0  # the same in the longer search of a grid with ridges
+FOLDS_BESIDE_RIDGES = 0.2  # weight of the distances from folds there
 NODES_PER_THREAD = 300  # fewest nodes worth a thread of their own
 PROJECTION_PARTS = 3  # parts per thread in projection, as nodes at the boundary take less time
 LARGEST_DEGREE = 12  # most neighbours of a node while the grid is improved, unless it had more
@@ -137,6 +140,9 @@ class WorkingMesh:
     projection_distance: np.ndarray  #: (C,) from the scan; NaN before projection and over closed holes [scan unit]
     sharp: np.ndarray  #: (N,) bool, which of the curves are ridges, which the local surface rounds off
     folds: float  #: weight of the distances of nodes and members from the folds of the scan
+    length_weight: float = (
+        LENGTH_WEIGHT  #: weight of the lengths of members against the shapes of triangles, until the last sweeps
+    )
 
     @classmethod
     def from_grid(
@@ -177,6 +183,17 @@ class WorkingMesh:
         queue, located = np.zeros((2, len(net.degree)), np.int64)
         point_location.locate_nodes(net, surface, patches, length, queue, located)
         mesh = cls(net, source, surface, patches, fixed, curves, length, np.full(len(patches), np.nan), sharp, folds)
+        mesh.renew(0.0)
+        return mesh
+
+    def beside_ridges(self) -> WorkingMesh:
+        """The same mesh, which shares its arrays, for a search in which lengths and the folds of the scan count for more.
+
+        Between the chains of ridges members are too long or too short where triangles are still in shape; and what the chains follow
+        lies at folds, from which a longer search would move away.
+        """
+        folds = max(self.folds, FOLDS_BESIDE_RIDGES)
+        mesh = replace(self, length_weight=WEIGHT_BESIDE_RIDGES, folds=folds)
         mesh.renew(0.0)
         return mesh
 
