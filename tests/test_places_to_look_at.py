@@ -185,6 +185,9 @@ def test_teeth_are_a_zigzag_and_straight_sides_corners_and_a_step_are_none() -> 
     gables = teeth.nodes[teeth.boundary_loops[0]]  # where the scan has corners there, they are its gables
     assert not len(zigzags(teeth, gables, 1.0))
     assert len(zigzags(teeth, gables - [0.0, 0.3, 0.0], 1.0)) == len(found)
+    highest = teeth.nodes[:, 1] > y.max() + 0.1
+    spiked = teeth.replace(nodes=teeth.nodes + highest[:, None] * [0.0, 0.6, 0.0])  # no gable is as sharp
+    assert len(zigzags(spiked, spiked.nodes[spiked.boundary_loops[0]], 1.0))
 
 
 def test_more_than_one_percent_missed_by_half_a_member_is_a_warning_with_its_place() -> None:

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 NODES_TURNED_OVER = 6  # nodes along a boundary in which turns are summed
 AT_CORNER = 0.1  # distance of a node from a corner of the scan up to which it is that corner [member lengths]
+SPIKE_TURN = 130.0  # turn at a node from which on it is the tip of a spike, of the scan or not [degree]
 NO_CORNERS = np.zeros((0, 3))
 ZIGZAG_TURN = 130.0  # sum of the turns to either side among them from which on a boundary runs zigzag [degree]
 SMALL_HOLE = 12  # nodes around a hole up to which it may be none
@@ -63,7 +64,7 @@ def _warning(kind: str, words: str, places: np.ndarray, origin: np.ndarray) -> F
 def zigzags(grid: Grid, corners: np.ndarray = NO_CORNERS, length: float = 0.0) -> np.ndarray:
     """Return the nodes (K,) in the middle of zigzags: on a few members around them a boundary turns much to both sides.
 
-    A turn at a corner of the scan (C, 3), as at the peak of a gable, is none; desired member length given [scan unit].
+    A turn at a corner of the scan (C, 3), as at the peak of a gable, is none, but beside a spike; desired member length given [scan unit].
     """
     a, b, c = grid.nodes[grid.triangles.T]
     upward = np.zeros_like(grid.nodes)
@@ -79,7 +80,11 @@ def zigzags(grid: Grid, corners: np.ndarray = NO_CORNERS, length: float = 0.0) -
         turn = np.degrees(np.arctan2(np.linalg.norm(across, axis=1), (behind * ahead).sum(axis=1)))
         turn *= np.sign((across * upward[loop]).sum(axis=1))
         gaps = np.linalg.norm(grid.nodes[loop][:, None] - corners, axis=2).min(axis=1, initial=np.inf)
-        turn[gaps <= AT_CORNER * length] = 0.0
+        spiked = np.abs(turn) > SPIKE_TURN
+        beside = np.any(
+            [np.roll(spiked, k) for k in range(-NODES_TURNED_OVER // 2, NODES_TURNED_OVER // 2 + 1)], axis=0
+        )
+        turn[(gaps <= AT_CORNER * length) & ~beside] = 0.0
         around = np.array([np.roll(turn, NODES_TURNED_OVER // 2 - k) for k in range(NODES_TURNED_OVER)])
         least = np.minimum(np.maximum(around, 0.0).sum(axis=0), np.maximum(-around, 0.0).sum(axis=0))
         highest = least >= np.max([np.roll(least, k) for k in range(-NODES_TURNED_OVER, NODES_TURNED_OVER + 1)], axis=0)
