@@ -17,9 +17,8 @@ SHORTEST_SIDE = 0.6  # shortest length of the curve on each side, where another 
 # start and end of the part of the curve on each side that shows where a corner may be [member lengths]
 SIGHT_ALONG_CURVE = (0.1, 0.8)
 CORNER_SPACING = 0.5  # on each side, where a corner turns most; its place lies no farther off [member lengths]
-NEAREST_CORNERS = (
-    0.6  # of corners closer together the sharpest stays: the member between them would be too short [member lengths]
-)
+# of corners closer together the sharpest stays: the member between them would be too short [member lengths]
+NEAREST_CORNERS = 0.6
 CURVED_FIT_RATIO = 6.0  # a side counts as curved if a quadratic fits it this many times better than a line
 MOST_ANGLE_RATIO = 1.3  # largest ratio of the angle of a corner to the angle between quadratics fitted to its sides
 MEDIAN_TURN_RATIO = 1.7  # a corner turns at least this many times more than the median of its loop

@@ -34,9 +34,8 @@ if TYPE_CHECKING:
 TRIANGLE_MEMBER = 3.0**0.5  # member of the triangles whose dual has members of 1
 HEXAGON_ROUNDS, HEXAGON_STEPS = 12, 12  # times that nodes return to the scan, and steps between
 HEXAGON_ANGLES = 0.35  # weight of the angles, 120 degrees, against the lengths
-ON_SEAM = (
-    0.25  # distance of a fixed position from the boundary or a line up to which one of its nodes goes there [members]
-)
+# distance of a fixed position from the boundary or a line up to which one of its nodes goes there [members]
+ON_SEAM = 0.25
 HEXAGON_STEP = 0.22  # of the step to the least energy of a node whose neighbours rest
 
 

@@ -13,9 +13,8 @@ from .quad_mesh import QuadMesh
 WORST_PENALTY = 2  # growth of the sum of squared irregularities up to which a move is tried
 MOST_QUADS = 7  # most quads at a node after a collapse
 FEWEST_QUADS = 3  # fewest quads at a node inside
-LEAST_STRAIGHT = (
-    0.95  # distance of two nodes of the boundary over the way along it, below which the bend between them stays
-)
+# distance of two nodes of the boundary over the way along it, below which the bend between them stays
+LEAST_STRAIGHT = 0.95
 NO_PAIR = (-1, -1)  # of a move that neither merges nor splits nodes
 
 

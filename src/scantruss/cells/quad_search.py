@@ -16,9 +16,8 @@ MOST_PRICE = 0.25  # largest energy that an average quad is assumed to have
 # what the square of the members too many or too few at a node counts beside the energy, and counts once few are left
 IRREGULAR_PRICE, LAST_IRREGULAR_PRICE = 0.3, 0.12
 LED_IRREGULAR_PRICE = 0.1  # the same where rows follow the curvature, which turns them
-RENEWED_IN_SEARCH = (
-    0.4  # distance of a node from the centre of its patch that gets it a new one after a round [members]
-)
+# distance of a node from the centre of its patch that gets it a new one after a round [members]
+RENEWED_IN_SEARCH = 0.4
 SWEEPS_AFTER_ROUND = 30  # most sweeps of all nodes after a round
 
 

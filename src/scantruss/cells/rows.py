@@ -25,13 +25,11 @@ from .stops import ways_along
 
 DIRECTION_TURNS = 30  # most turns of diffusion and normalization of the directions
 LATTICE_TURNS = 30  # the same of the lattice
-CURVATURE_WEIGHT = (
-    20.0  # weight of a guide where the principal curvatures differ by one over a member, against one edge
-)
+# weight of a guide where the principal curvatures differ by one over a member, against one edge
+CURVATURE_WEIGHT = 20.0
 HELD_WEIGHT = 30.0  # weight of what the boundary and lines ask of the lattice, against one edge
-ROWS_TURN_OVER = (
-    1.5  # way from the boundary and lines over which rows that follow them come to follow a guide [members]
-)
+# way from the boundary and lines over which rows that follow them come to follow a guide [members]
+ROWS_TURN_OVER = 1.5
 LEAST_CHAIN_AGREEMENT = 0.5  # least agreement of the ways of chains at a node for it to tell a direction
 
 

@@ -21,9 +21,8 @@ if TYPE_CHECKING:
     from ..settings import Settings
     from .distances import Distances
 
-OFF_SURFACE = (
-    0.5  #: members from the scan, beside the radius of the holes that are closed, at which a triangle has left it
-)
+#: members from the scan, beside the radius of the holes that are closed, at which a triangle has left it
+OFF_SURFACE = 0.5
 UNEVEN_LENGTHS = 0.4  #: standard deviation of the lengths, in mean lengths, from which on a grid follows no surface
 FIXED_TOLERANCE = 1e-6  #: members that a fixed node may be off its position: nothing but rounding
 

@@ -23,9 +23,8 @@ STEADY_PLACES_OF_DIRECTION, PLACES_LEFT_OUT = 9, 3
 CORNER_KEPT_WITHIN = 0.1
 # distance from the end of the scan along a ridge within which a corner beyond it is that of the ridge [member lengths]
 CORNER_BEYOND_WITHIN = 0.6
-POINTS_AT_CORNER = (
-    0.2  # distance of such a corner from the nearest point up to which the scan reaches it [member lengths]
-)
+# distance of such a corner from the nearest point up to which the scan reaches it [member lengths]
+POINTS_AT_CORNER = 0.2
 DENSITY_REACH = 0.5  # how far back along the ridge the density of the points is measured [member lengths]
 LOOK_FORWARD = 2.0  # how far the scan may go on along it [member lengths]
 GAP_AT_END = 14.0  # a gap so many times as long as the usual one between points along the ridge is the end of the scan

@@ -37,9 +37,8 @@ SHOWN_DISPLACEMENT = 0.06  #: of the greatest displacement, as it is drawn first
 LOAD_ARROW = 0.08  #: of the greatest load [extent of the scan]
 SUPPORT_COLOR = np.array((20, 130, 60), np.uint8)
 LOAD_COLOR = np.array((235, 120, 10), np.uint8)
-MOST_ARROWS = (
-    160  #: of loads, for more hide the members; where more nodes are loaded, as many of them, far from one another
-)
+#: of loads, for more hide the members; where more nodes are loaded, as many of them, far from one another
+MOST_ARROWS = 160
 NO_LOAD = 1e-9  #: share of the greatest load of a node up to which another has none
 ARROW_WIDTH = 2.0  #: of a load [pixel]
 SUPPORT_RADIUS = 0.09  #: of a support that is drawn [scene]

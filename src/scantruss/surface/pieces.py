@@ -11,9 +11,8 @@ from ..scan.vectors import dots
 LEAST_TRIANGLES = 20.0  # fewest triangles of a piece that gets a grid
 TRIANGLE_AREA = 0.433  # area of a regular triangle [square of its side]
 LEAST_SHARE = 0.01  # least area of such a piece [area of the largest piece]
-SPACINGS_OF_CELL = (
-    4.0  # width of the cells by which pieces are ordered, so that no member length changes that [point spacings]
-)
+# width of the cells by which pieces are ordered, so that no member length changes that [point spacings]
+SPACINGS_OF_CELL = 4.0
 LEAST_SAMPLES = 12  # fewest samples of such a piece
 
 

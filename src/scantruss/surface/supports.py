@@ -23,9 +23,8 @@ SLAB_RADII = 3.0  # height and width of the cells in which columns without a flo
 UPRIGHT_WITHIN, EVEN_WITHIN = 0.2, 0.3
 WIDEST_COLUMN = 1.6  # widest column without a floor in plan [member lengths]; a grid has five members or less around it
 MOST_IN_COLUMNS = 0.4  # share of the samples from which on they are no columns but the shell
-LEAST_ROUND = (
-    0.2  # least variance in plan across a column, in that along it: a strip of a shell has less, half a tube 0.19
-)
+# least variance in plan across a column, in that along it: a strip of a shell has less, half a tube 0.19
+LEAST_ROUND = 0.2
 OUTSIDE = 0.75  # distance from the middle of a column from which on a sample is none of it [widths]
 FEWEST_OF_SHELL = 6  # fewest samples above a column, near it, that are a shell
 

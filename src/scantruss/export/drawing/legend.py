@@ -19,9 +19,8 @@ FAULT_COLOUR, WARNING_SIGN_COLOUR = np.array([0.78, 0.05, 0.10]), np.array([0.80
 MOST_MARKS = 5  # marks of a kind in a picture
 # of a legend: from line to line, of a sign, of a letter on average at most [em]
 LEGEND_LINE, LEGEND_SIGN, LEGEND_LETTER = 1.6, 1.4, 0.62
-LEAST_LEFT_BY_LEGEND = (
-    0.2  # share of the width and height of a picture that is left to the grid however long the legend is
-)
+# share of the width and height of a picture that is left to the grid however long the legend is
+LEAST_LEFT_BY_LEGEND = 0.2
 BAR_SHARE = 0.18  # largest share of the width that a scale bar takes
 UNPLACED_SIGN = "!"  # before the words of a fault or warning that is marked at no place
 RING_SIZE, SMALL_RING_SIZE = 1.6, 0.8  # diameters of a ring at the worst place of a kind, and at further ones [em]
