@@ -52,6 +52,19 @@ def test_a_scan_that_is_no_raster_stays_whole(name: str) -> None:
     assert len(st.PointCloud.from_array(points).points) == len(points)
 
 
+@pytest.mark.parametrize("value", [-99.0, -9999.0, 0.0])
+def test_a_usual_value_for_no_data_far_from_a_scan_that_is_no_raster_is_left_out(value: float) -> None:
+    """Its area made the members that were suggested several times too long."""
+    points = make("cloth", 5000).points + [0.0, 0.0, 400.0]
+    points[:, 2] -= 0.0 if value == 0.0 else 400.0
+    at = np.random.default_rng(1).random(len(points)) < 0.04
+    points[at, 2] = value
+    cloud = st.PointCloud.from_array(points)
+    assert cloud.left_out == (("with a height that stands for no data", at.sum()),)
+    points[at, 2] = points[~at, 2].min() - 3.0  # as a floor that is level to the last digit
+    assert len(st.PointCloud.from_array(points).points) == len(points)
+
+
 @pytest.mark.parametrize("share", [0.02, 0.4])
 @pytest.mark.parametrize("place", [(-9999.0, -9999.0, -9999.0), (0.0, 0.0, 0.0)])
 def test_points_at_one_place_far_away_are_left_out_and_told(place: tuple[float, float, float], share: float) -> None:

@@ -23,6 +23,17 @@ FEWEST_POINTS = 100  # points below which no value is called invalid
 FARTHEST_FROM_MIDDLE = 1e6  # widths of the middle half of a scan from its middle, beyond which a value is invalid
 RASTER_COLUMNS = 4.0  # most different x of a raster, in square roots of its number of points
 NO_DATA_SHARES, FEWEST_NO_DATA = (0.002, 0.5), 20  # share and number of points that may have a value for no data
+USUAL_NO_DATA = (
+    0.0,
+    -99.0,
+    -999.0,
+    -9999.0,
+    -99999.0,
+    -32767.0,
+    -32768.0,
+    9999.0,
+    99999.0,
+)  # heights that often stand for no data
 CLIFF_GAP = 0.1  # gap to the other heights, as a share of their range, that no terrain has
 STEEP_CLIFF = 10.0  # slope to the nearest others, in multiples of the usual one, that no shore has
 SOME_OF_RASTER = 20_000  # points of the rest that are looked at
@@ -182,15 +193,17 @@ def invalid_values_note(points: np.ndarray) -> str:
 
 
 def find_no_data(points: np.ndarray) -> tuple[np.ndarray, float] | None:
-    """Return which points of a raster have a value for no data as their height, (N,) bool, and that value; None if none has.
+    """Return which points have a value for no data as their height, (N,) bool, and that value; None if none has.
 
-    Then many points share exactly the least or the greatest height, and a cliff divides them from their neighbours; a lake has a shore.
+    Then many points share exactly the least or the greatest height. In a raster a cliff divides them from their neighbours; a lake has a
+    shore. In other scans it is a usual value for no data, farther below or above the rest than that is wide.
     """
     x, z = points[:, 0], points[:, 2]
+    if len(points) < FEWEST_POINTS:
+        return None
     most = RASTER_COLUMNS * math.sqrt(len(points))
     some = x[:: int(len(x) / (2.0 * most + 1.0)) + 1]  # of these as many are different at most
-    if len(points) < FEWEST_POINTS or len(np.unique(some)) > most or len(np.unique(x)) > most:
-        return None
+    is_raster = len(np.unique(some)) <= most and len(np.unique(x)) <= most
     for value in (z.min(), z.max()):
         at: np.ndarray = z == value
         count, rest = int(at.sum()), z[~at]
@@ -201,7 +214,11 @@ def find_no_data(points: np.ndarray) -> tuple[np.ndarray, float] | None:
         ):
             continue
         gap = float(np.abs(rest - value).min())
-        if gap > CLIFF_GAP * np.ptp(rest) or _has_cliff(points[at], points[~at]):
+        if is_raster:
+            found = gap > CLIFF_GAP * np.ptp(rest) or _has_cliff(points[at], points[~at])
+        else:
+            found = float(value) in USUAL_NO_DATA and gap > np.ptp(points[~at], axis=0).max()
+        if found:
             return at, float(value)
     return None
 
