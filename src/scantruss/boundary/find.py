@@ -17,7 +17,8 @@ from ..kernels.surface.size_field import lengths_along
 from ..runtime.progress import Progress
 from ..scan.normals import check_two_sided
 from ..settings import Settings
-from ..surface.samples import SurfaceSamples, broad_normals, distance_from_scan, is_graded, samples_with
+from ..surface.near_scan import distance_from_scan
+from ..surface.samples import SurfaceSamples, broad_normals, is_graded, samples_with
 from .corners import CURVE_STEP
 from .curves import cut_spikes, length_around, resample
 from .given import cut_along

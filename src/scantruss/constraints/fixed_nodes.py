@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..errors import InputError, words_of_number
-from ..surface.near_scan import nearest_words, place_text
-from ..surface.samples import SurfaceSamples, distance_from_scan, local_field
+from ..surface.near_scan import distance_from_scan, local_field, nearest_words, place_text
+from ..surface.samples import SurfaceSamples
 
 
 def check_fixed_positions(

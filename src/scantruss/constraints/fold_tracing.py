@@ -15,7 +15,7 @@ from ..kernels.surface.ridges import FOLD
 from ..kernels.surface.wide_folds import fit_wide_fold
 from ..runtime.jit import new_record
 from ..runtime.watch import Watch
-from ..surface.samples import distance_from_scan
+from ..surface.near_scan import distance_from_scan
 
 if TYPE_CHECKING:
     from ..settings import Settings

@@ -27,8 +27,9 @@ from ..kernels.surface.local_surface import (
 from ..kernels.surface.ridges import mean_normal
 from ..runtime.jit import new_record
 from ..settings import Settings
+from ..surface.near_scan import local_field
 from ..surface.pieces import TRIANGLE_AREA
-from ..surface.samples import SurfaceSamples, local_field
+from ..surface.samples import SurfaceSamples
 from .orientation_field import nodes_at
 
 FRONT_CLEARANCE = 0.6  # least distance of a candidate node from the initial front [member lengths]

@@ -9,8 +9,7 @@ from ..kernels.boundary.curves import nearest_on_curves
 from ..kernels.mesh.grid import AT_REST, ON_CURVE, Net, may_split, split
 from ..kernels.mesh.point_location import nearest_sample
 from ..kernels.mesh.trial import Scratch
-from ..surface.near_scan import place_text
-from ..surface.samples import local_field
+from ..surface.near_scan import local_field, place_text
 from .equalize import FARTHEST_ON_THE_WAY, energy_of_grid, new_scratch, search_once, settle
 from .working_mesh import WorkingMesh
 

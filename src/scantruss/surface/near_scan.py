@@ -1,17 +1,37 @@
-"""Places that a user names, and where they lie beside the scan."""
+"""Places beside the scan: how far off they are, which length is desired there, and what is said of those that a user names."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..errors import InputError, unit_words, words_of_number
-from .samples import SurfaceSamples, distance_from_scan
+
+if TYPE_CHECKING:
+    from ..kernels.surface.local_surface import Surface
+    from .samples import SurfaceSamples
 
 #: ratios of units, and theirs of feet and inches: places in one of them are read as in another
 OTHER_UNITS = (10.0, 100.0, 1000.0, 0.1, 0.01, 0.001, 0.3048, 1 / 0.3048, 25.4, 1 / 25.4, 12.0, 1 / 12.0)
 FAR_SCAN = 2.0  # distance of a scan from zero at which its box tells units apart [its size]
+
+
+def local_field(surface: Surface, place: np.ndarray) -> float:
+    """Desired length at a place: that of the nearest sample [`length`]."""
+    return float(surface.field[((surface.mean - place) ** 2).sum(axis=1).argmin()])
+
+
+def distance_from_scan(surface: Surface, place: np.ndarray) -> float:
+    """Distance of a place from the nearest point of the scan."""
+    squares = ((surface.mean - place) ** 2).sum(axis=1)
+    reach = np.sqrt(squares.min()) + 2.0 * surface.radius
+    best = np.inf
+    for sample in np.flatnonzero(squares <= reach * reach):
+        points = surface.points[surface.start[sample] : surface.start[sample + 1]]
+        best = min(best, float(((points - place) ** 2).sum(axis=1).min()))
+    return float(np.sqrt(best))
 
 
 def check_on_scan(

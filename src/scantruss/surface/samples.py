@@ -198,11 +198,6 @@ def is_graded(surface: Surface) -> bool:
     return bool(np.any(surface.field != 1.0))
 
 
-def local_field(surface: Surface, place: np.ndarray) -> float:
-    """Desired length at a place: that of the nearest sample [`length`]."""
-    return float(surface.field[((surface.mean - place) ** 2).sum(axis=1).argmin()])
-
-
 def samples_with(
     samples: SurfaceSamples, added: np.ndarray, settings: Settings, kept: np.ndarray | None = None
 ) -> SurfaceSamples:
@@ -271,17 +266,6 @@ def with_whole_boundary(samples: SurfaceSamples, surface: Surface, boundary_poin
     points = np.concatenate([surface.points, near[owner >= 0]])
     grouped, start, _ = group(points, np.concatenate([owned, owner[owner >= 0]]), len(surface.mean))
     return surface._replace(points=grouped, start=start)
-
-
-def distance_from_scan(surface: Surface, place: np.ndarray) -> float:
-    """Distance of a place from the nearest point of the scan."""
-    squares = ((surface.mean - place) ** 2).sum(axis=1)
-    reach = np.sqrt(squares.min()) + 2.0 * surface.radius
-    best = np.inf
-    for sample in np.flatnonzero(squares <= reach * reach):
-        points = surface.points[surface.start[sample] : surface.start[sample + 1]]
-        best = min(best, float(((points - place) ** 2).sum(axis=1).min()))
-    return float(np.sqrt(best))
 
 
 def broad_normals(surface: Surface) -> np.ndarray:
