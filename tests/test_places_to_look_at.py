@@ -468,5 +468,8 @@ def test_a_corner_where_no_scan_is_cannot_be_cut_off() -> None:
     points[at] *= 1.0 + 0.5 / np.linalg.norm(points[at])
     guessed = Boundary((replace(loop, points=points),))
     for scan, said in ((loop.points, False), (points, True)):
-        samples = cast(Any, SimpleNamespace(measured_points=scan, spacing=0.02))
+        known_of_scan = {"measured_points": scan, "spacing": 0.02, "surface": SimpleNamespace(points=None)}
+        samples = cast(
+            Any, type("Scan", (), known_of_scan)()
+        )  # unlike a namespace something that boxes can be kept for
         assert bool(places_aside(grid, guessed, 1.0, samples)) == said

@@ -10,8 +10,7 @@ import numpy as np
 from ..constraints.network import curves_of
 from ..grid.certificate import Fault
 from ..kernels.boundary.curves import Curves, distances_from_curves
-from ..kernels.mesh.coverage import nearest_distances
-from .distances import POINT_BOX, boxes_of, distances_to_grid, heights_over
+from .distances import distances_to_grid, heights_over, nearest_point_distances
 from .left_out import points_together
 from .limits import HEXAGON_BOUNDARY, NOISES_OFF, Figure
 
@@ -64,14 +63,13 @@ def _without_guesses(loop: Loop, samples: SurfaceSamples, length: float) -> Loop
     """Return a loop without the corners that lie far from all points of the scan, and without what of it leads to them."""
     if not len(loop.corner_at):
         return loop
-    points, away = samples.measured_points, np.empty(len(loop.points))
-    boxes = boxes_of(points, max(POINT_BOX * length, 2.0 * samples.spacing))
-    nearest_distances(loop.points, points, boxes, 2.0 * samples.spacing, away)
-    member = length * (np.ones(len(away)) if loop.desired is None else loop.desired)
-    guessed = away > np.maximum(EMPTY_FROM * member, SPACINGS_OUT * samples.spacing)
-    corners = loop.corner_at[guessed[loop.corner_at]]
+    member = length * (np.ones(len(loop.points)) if loop.desired is None else loop.desired)
+    limit = np.maximum(EMPTY_FROM * member, SPACINGS_OUT * samples.spacing)
+    corners, places = loop.corner_at, loop.points
+    corners = corners[nearest_point_distances(places[corners], samples, length) > limit[corners]]
     if not len(corners):
         return loop
+    guessed = nearest_point_distances(places, samples, length) > limit
     gaps = np.linalg.norm(loop.points[:, None] - loop.points[corners], axis=2).min(axis=1)
     stays = ~(guessed & (gaps < member))
     numbers = np.cumsum(stays) - 1
@@ -194,9 +192,7 @@ def boundary_beyond(grid: Grid, samples: SurfaceSamples, boundary: Boundary, len
     if len(over):
         over = over[distances_to_grid(curve[over], grid, length)[0] <= COVERED_WITHIN * at_curve[over]]
     if len(out):
-        points, away = samples.measured_points, np.empty(len(out))
-        boxes = boxes_of(points, max(POINT_BOX * length, 2.0 * samples.spacing))
-        nearest_distances(middles[out], points, boxes, 2.0 * samples.spacing, away)
+        away = nearest_point_distances(middles[out], samples, length)
         out = out[away > np.maximum(EMPTY_FROM * at_middles[out], SPACINGS_OUT * samples.spacing)]
     off, places = np.concatenate([off_curve[over], off_middles[out]]), np.concatenate([curve[over], middles[out]])
     members = np.concatenate([at_curve[over], at_middles[out]])

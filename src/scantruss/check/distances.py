@@ -60,6 +60,15 @@ def measure_distances(grid: Grid, samples: SurfaceSamples, length: float) -> Dis
     return Distances(scan, triangle, triangles, nodes, noise)
 
 
+def nearest_point_distances(places: np.ndarray, samples: SurfaceSamples, length: float) -> np.ndarray:
+    """Return the distance of each place (..., 3) from the nearest measured point of a scan; desired member length given [scan unit]."""
+    points, flat = samples.measured_points, np.ascontiguousarray(places.reshape(-1, 3))
+    boxes = kept_boxes_of(points, max(POINT_BOX * length, 2.0 * samples.spacing), samples)
+    away = np.empty(len(flat))
+    nearest_distances(flat, points, boxes, 2.0 * samples.spacing, away)
+    return away.reshape(places.shape[:-1])
+
+
 def distances_to_grid(points: np.ndarray, grid: Grid, length: float) -> tuple[np.ndarray, np.ndarray]:
     """Return the distance of each point (N, 3) from the nearest triangle (N,), and that triangle (N,) int64.
 

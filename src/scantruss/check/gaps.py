@@ -8,11 +8,9 @@ import numpy as np
 
 from ..errors import words_of_number
 from ..grid.certificate import Fault, LeftOut, place_of
-from ..kernels.geometry.boxes import SearchBoxes
 from ..kernels.geometry.components import component_labels
-from ..kernels.mesh.coverage import nearest_distances
 from ..surface.chosen_samples import LIMB, ROD
-from .distances import POINT_BOX, boxes_of
+from .distances import nearest_point_distances
 from .limits import PLACES_KEPT
 from .mouths import mouths_closed
 
@@ -71,9 +69,8 @@ def _gaps_within(
     the triangles, so that a triangle off a bent surface is none over a gap.
     """
     points = samples.measured_points
-    boxes = boxes_of(points, max(POINT_BOX * length, 2.0 * samples.spacing))
     places, owner = _places(grid)
-    away = _nearest(places, points, boxes, samples.spacing)
+    away = nearest_point_distances(places, samples, length)
     members = np.full(len(grid.nodes), length) if grid.desired is None else grid.desired
     members = members[grid.triangles].mean(axis=1)
     least = HALF_WIDTH * members
@@ -85,7 +82,7 @@ def _gaps_within(
     least = np.maximum(least, FAR_OF_USUAL * usual)
     covering = np.unique(owner[away > (least - NEAR_MIDDLE * members)[owner]])
     extra, theirs = _more_places(grid, covering)
-    from_extra = _nearest(extra, points, boxes, samples.spacing)
+    from_extra = nearest_point_distances(extra, samples, length)
     order = np.lexsort((-from_extra, theirs))
     best = order[np.unique(theirs[order], return_index=True)[1]]
     needed = np.repeat([POINTS_AROUND, POINTS_AROUND_MIDDLE], [len(places), len(best)])
@@ -100,7 +97,7 @@ def _gaps_within(
         return [], []
     triangle = owner[far]
     group = _groups(grid, triangle, places[far], half)[triangle]
-    is_open = _open_triangles(grid, samples.measured_points, boxes, length)
+    is_open = _open_triangles(grid, samples, length)
     found: list[tuple[float, LeftOut, bool, bool]] = []
     for each in np.unique(group):
         own = np.flatnonzero(group == each)
@@ -157,13 +154,6 @@ def openings_closed(
 def _has_points_within(points: np.ndarray, place: np.ndarray, reach: float | None) -> bool:
     """Whether any of the points (N, 3) lies within reach of a place (3,)."""
     return bool((((points - place) ** 2).sum(axis=1) <= (reach or 0.0) ** 2).any())
-
-
-def _nearest(places: np.ndarray, points: np.ndarray, boxes: SearchBoxes, spacing: float) -> np.ndarray:
-    """Return the distance of each place (K, 3) from the nearest point (K,); boxes of the points, and their spacing."""
-    away = np.empty(len(places))
-    nearest_distances(places, points, boxes, 2.0 * spacing, away)
-    return away
 
 
 def by_x(points: np.ndarray) -> np.ndarray:
@@ -253,12 +243,11 @@ def _more_places(grid: Grid, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray
     return places, chosen[np.nonzero(~near)[0]]
 
 
-def _open_triangles(grid: Grid, points: np.ndarray, boxes: SearchBoxes, length: float) -> np.ndarray:
+def _open_triangles(grid: Grid, samples: SurfaceSamples, length: float) -> np.ndarray:
     """Return which triangles (T,) bool have a node where the boundary of the grid leaves the scan."""
     members = grid.edges[grid.edge_triangles[:, 1] < 0]
     places = np.concatenate([grid.nodes[members].mean(axis=1), grid.nodes[members[:, 0]]])
-    away = np.empty(len(places))
-    nearest_distances(places, points, boxes, 0.25 * length, away)
+    away = nearest_point_distances(places, samples, length)
     ends = np.concatenate([members, members[:, :1].repeat(2, axis=1)])
     return np.asarray(np.isin(grid.triangles, ends[away > OPEN_FROM * length]).any(axis=1))
 

@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..grid.certificate import Fault, place_of
-from ..kernels.mesh.coverage import nearest_distances
-from .distances import POINT_BOX, boxes_of, normals_at_nodes
+from .distances import nearest_point_distances, normals_at_nodes
 from .gaps import by_x, points_within
 from .limits import PLACES_KEPT
 
@@ -200,10 +199,8 @@ def _is_off_along(place: np.ndarray, normal: np.ndarray, length: float, points: 
 
 def _middles_away(grid: Grid, samples: SurfaceSamples, which: np.ndarray, desired: np.ndarray) -> np.ndarray:
     """Return the distance of the middle of each of some members (K,) from the nearest point (K,)."""
-    points, length = samples.measured_points, float(desired.mean())
-    middles, away = np.ascontiguousarray(grid.nodes[grid.edges[which]].mean(axis=1)), np.empty(len(which))
-    nearest_distances(middles, points, boxes_of(points, max(POINT_BOX * length, 2.0 * samples.spacing)), length, away)
-    return away
+    middles = grid.nodes[grid.edges[which]].mean(axis=1)
+    return nearest_point_distances(middles, samples, float(desired.mean()))
 
 
 def _hangs(grid: Grid, chosen: np.ndarray, uses: np.ndarray) -> np.ndarray:

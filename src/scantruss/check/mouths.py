@@ -8,15 +8,13 @@ import numpy as np
 
 from ..errors import words_of_number
 from ..grid.certificate import Fault, place_of
-from ..kernels.mesh.coverage import nearest_distances
-from .distances import POINT_BOX, boxes_of
+from .distances import nearest_point_distances
 from .limits import PLACES_KEPT
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from ..grid.grid import Grid
-    from ..kernels.geometry.boxes import SearchBoxes
     from ..surface.samples import SurfaceSamples
 
 ALONG_MEMBER = np.linspace(0.1, 0.9, 9)  # places along a member of the boundary that are looked at
@@ -42,10 +40,8 @@ def mouths_closed(grid: Grid, samples: SurfaceSamples, length: float, said: Sequ
     members = np.concatenate(ends)
     places = members[:, :1] + ALONG_MEMBER[:, None] * (members[:, 1:] - members[:, :1])
     loop = np.arange(len(chains)).repeat([len(chain) * len(ALONG_MEMBER) for chain in chains])
-    points = samples.measured_points
-    boxes = boxes_of(points, max(POINT_BOX * length, 2.0 * samples.spacing))
     places = places.reshape(-1, 3)
-    is_open = _away(places, points, boxes, samples.spacing) > HALF_MOUTH * length
+    is_open = nearest_point_distances(places, samples, length) > HALF_MOUTH * length
     places, loop = places[is_open], loop[is_open]
     pairs = [
         (number, other)
@@ -58,10 +54,10 @@ def mouths_closed(grid: Grid, samples: SurfaceSamples, length: float, said: Sequ
         return []
     one, other = places[np.array(pairs).T]
     across = one[:, None] + ACROSS_STRIP[:, None] * (other - one)[:, None]
-    half = _away(across, points, boxes, samples.spacing).min(axis=1)
+    half = nearest_point_distances(across, samples, length).min(axis=1)
     middles = 0.5 * (one + other)
     centres = grid.nodes[grid.triangles].mean(axis=1)
-    of_centres = _away(centres, points, boxes, samples.spacing)
+    of_centres = nearest_point_distances(centres, samples, length)
     chosen = np.flatnonzero(half > HALF_MOUTH * length)
     around = [np.linalg.norm(centres - middles[at], axis=1) < AROUND_MOUTH * length for at in chosen.tolist()]
     usual = np.array([np.median(of_centres[near]) for near in around])
@@ -77,11 +73,3 @@ def mouths_closed(grid: Grid, samples: SurfaceSamples, length: float, said: Sequ
     words = f"closes the mouth, {words_of_number(2.0 * half[widest[0]], 3)}{unit} wide, of a slot or bay{more}"
     at, *others = (place_of(middles[each] + samples.origin) for each in widest[:PLACES_KEPT])
     return [Fault("gap", f"{words}; shorter members leave it open", at, tuple(others))]
-
-
-def _away(places: np.ndarray, points: np.ndarray, boxes: SearchBoxes, spacing: float) -> np.ndarray:
-    """Return the distance of each place (..., 3) from the nearest of some points (N, 3), given by box too."""
-    flat = np.ascontiguousarray(places.reshape(-1, 3))
-    distance = np.empty(len(flat))
-    nearest_distances(flat, points, boxes, 2.0 * spacing, distance)
-    return distance.reshape(places.shape[:-1])

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..boundary.find import Boundary, Loop
+from ..surface.near_scan import distance_from_scan
 
 if TYPE_CHECKING:
     from ..surface.samples import SurfaceSamples
@@ -66,11 +67,7 @@ def _is_short_of_corner(end: np.ndarray, line: np.ndarray, loop: Loop, samples: 
     gap, ahead = corner - end, line[-1] - line[max(len(line) - PLACES_OF_DIRECTION, 0)]
     if np.linalg.norm(gap) > CORNER_BEYOND_WITHIN * length or gap @ ahead <= 0.0:
         return False
-    surface = samples.surface
-    near = np.flatnonzero(np.linalg.norm(surface.mean - corner, axis=1) < length)
-    parts = [surface.points[surface.start[s] : surface.start[s + 1]] for s in near.tolist()]
-    away = np.linalg.norm(np.concatenate([np.zeros((0, 3)), *parts]) - corner, axis=1)
-    return bool(away.min(initial=np.inf) < POINTS_AT_CORNER * length)
+    return distance_from_scan(samples.surface, corner) < POINTS_AT_CORNER * length
 
 
 def scan_end(line: np.ndarray, samples: SurfaceSamples, length: float) -> np.ndarray | None:

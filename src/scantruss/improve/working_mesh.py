@@ -140,9 +140,8 @@ class WorkingMesh:
     projection_distance: np.ndarray  #: (C,) from the scan; NaN before projection and over closed holes [scan unit]
     sharp: np.ndarray  #: (N,) bool, which of the curves are ridges, which the local surface rounds off
     folds: float  #: weight of the distances of nodes and members from the folds of the scan
-    length_weight: float = (
-        LENGTH_WEIGHT  #: weight of the lengths of members against the shapes of triangles, until the last sweeps
-    )
+    #: weight of the lengths of members against the shapes of triangles, until the last sweeps
+    length_weight: float = LENGTH_WEIGHT
 
     @classmethod
     def from_grid(
