@@ -7,10 +7,11 @@ import pytest
 from small_grids import dome
 from typed import known
 
+from scantruss.boundary.curves import length_along
 from scantruss.check.limits import with_ridges_given_up
 from scantruss.check.unfollowed import broken_ridges
 from scantruss.constraints.ridge_ends import Ridge
-from scantruss.constraints.ridges import FAULT_REACH, cut_around, given_up, length_along
+from scantruss.constraints.ridges import FAULT_REACH, cut_around, given_up
 from scantruss.grid.certificate import Certificate
 from scantruss.grid.line_sets import RIDGE, LineSet
 

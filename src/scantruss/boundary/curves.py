@@ -15,6 +15,11 @@ from ..scan.vectors import dots
 POINTS_OF_DIRECTION = 4  # points on each side from which the direction of a curve is found
 
 
+def length_along(line: np.ndarray) -> float:
+    """Return the length of a polyline (K, 3)."""
+    return float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
+
+
 def length_around(turns: np.ndarray) -> float:
     """Length of a closed polyline."""
     return float(np.linalg.norm(np.roll(turns, -1, axis=0) - turns, axis=1).sum())

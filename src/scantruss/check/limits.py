@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..constraints.ridges import length_along
+from ..boundary.curves import length_along
 from ..errors import Place, words_of_number, words_of_place
 from ..grid.certificate import Certificate, Fault, place_of
 from ..grid.panels import inner_angles_of

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..boundary.curves import length_along
 from ..boundary.polylines import POINTS_UNDER_LINE, corners_of_polyline, divide_polyline, feet_on_scan, simplify
 from ..errors import InputError, unit_words, words_of_number
 from ..kernels.surface.local_surface import Surface
@@ -49,7 +50,7 @@ def add_polylines(network: Network, samples: SurfaceSamples, settings: Settings)
 
 def _check_length(given: np.ndarray, closed: bool, number: int, unit: str, length: float) -> None:
     """Refuse a line on which no members have room."""
-    total = float(np.linalg.norm(np.diff(given, axis=0), axis=1).sum())
+    total = length_along(given)
     least = (SHORTEST_RING if closed else SHORTEST_LINE) * length
     if total < least:
         what = "ring, that is at least two members" if closed else "line, that is at least half a member"

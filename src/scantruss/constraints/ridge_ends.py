@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..boundary.curves import length_along
 from ..scan.vectors import pairs_within
 
 LONGEST_BRIDGE = 4.0  # longest gap over which the ends of two ridges are joined [member lengths]
@@ -89,7 +90,7 @@ def join_ends(traced: list[Ridge], length: float) -> list[Ridge]:
         line = _led(_led(line, last)[::-1], first)[::-1]
         free = LEAST_ACUTE_RIDGE if ridge.acute else LEAST_FREE_RIDGE
         least = LEAST_RIDGE if first is not None and last is not None else free
-        if np.linalg.norm(np.diff(line, axis=0), axis=1).sum() >= least * length:
+        if length_along(line) >= least * length:
             found.append(ridge.moved(line))
     return found
 
@@ -104,7 +105,7 @@ def _closes(line: np.ndarray, length: float) -> bool:
     one, two = end_of(line, 0, -1), end_of(line, 0, 0)
     gap = two.place - one.place
     size = float(np.linalg.norm(gap))
-    whole = float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
+    whole = length_along(line)
     return (
         whole > 4.0 * size
         and size < LONGEST_BRIDGE * length

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..boundary.curves import length_along
 from ..boundary.polylines import divide_polyline
 from .fixed_lines import LINE_STEP
 from .fold_tracing import FOLD_STRIDE, Tracer, is_sharp, runs_along
@@ -143,11 +144,6 @@ def given_up(ridges: list[Ridge], places: np.ndarray, length: float) -> list[np.
             found += np.split(part, np.flatnonzero(steps > OVER_OPENING * length) + 1)
     found.sort(key=length_along, reverse=True)
     return [part for part in found if length_along(part) >= SHORTEST_RIDGE * length]
-
-
-def length_along(line: np.ndarray) -> float:
-    """Return the length of a polyline (K, 3)."""
-    return float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
 
 
 def _opened_at(ridge: Ridge, places: np.ndarray, length: float) -> np.ndarray | None:

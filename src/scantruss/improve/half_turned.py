@@ -9,6 +9,7 @@ import math
 
 import numpy as np
 
+from ..boundary.curves import length_along
 from ..grid.grid import Grid
 from ..scan.rotation import Rotation, turn_about
 from ..scan.symmetry import MirrorPlane, three_of
@@ -43,7 +44,7 @@ def rows_of(grid: Grid, wedge: Wedge, length: float) -> list[np.ndarray]:
         across, along = matrix @ normal, matrix @ ray
         for line in section_of(grid, across, float(across @ wedge.centre)):
             for piece in beyond_axis(line, wedge.centre, along):
-                if np.linalg.norm(np.diff(piece, axis=0), axis=1).sum() >= LEAST_PIECE * length:
+                if length_along(piece) >= LEAST_PIECE * length:
                     away = piece - wedge.centre
                     lines.append(np.outer(away @ along, along) + wedge.centre + grid.origin)
     return lines

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..boundary.curves import length_along
 from ..errors import FrontError
 from ..grid.grid import Grid
 from ..grid.line_sets import FIXED_LINE, LineSet
@@ -82,9 +83,7 @@ def mirror_lines(grid: Grid, wedge: Wedge, length: float) -> list[np.ndarray]:
     for (normal, offset), ray in zip(wedge.walls, wedge.rays, strict=True):
         for line in section_of(grid, normal, offset):
             pieces = [line] if ray is None else beyond_axis(line, wedge.centre, ray)
-            long = [
-                each for each in pieces if np.linalg.norm(np.diff(each, axis=0), axis=1).sum() >= LEAST_PIECE * length
-            ]
+            long = [each for each in pieces if length_along(each) >= LEAST_PIECE * length]
             found += [each + grid.origin for each in long]
     if wedge.axis is None:
         return found

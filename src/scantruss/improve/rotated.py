@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..boundary.curves import length_along
 from ..errors import FrontError
 from ..grid.grid import Grid
 from ..grid.panels import sides_of
@@ -39,7 +40,7 @@ def seams_of(grid: Grid, rotation: Rotation, length: float) -> list[list[np.ndar
     found = []
     for k in range(WAYS_TRIED_AROUND):
         lines = _lines_towards(grid, rotation, 2.0 * math.pi * k / (WAYS_TRIED_AROUND * rotation.order), length)
-        total = sum(float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum()) for line in lines)
+        total = sum(length_along(line) for line in lines)
         if lines:
             found.append((round(total / length, 3), k, lines))
     if not found:
@@ -101,11 +102,7 @@ def _lines_towards(grid: Grid, rotation: Rotation, angle: float, length: float) 
     pieces = [
         piece for line in section_of(grid, normal, float(normal @ centre)) for piece in beyond_axis(line, centre, ray)
     ]
-    return [
-        piece + grid.origin
-        for piece in pieces
-        if np.linalg.norm(np.diff(piece, axis=0), axis=1).sum() >= LEAST_SEAM * length
-    ]
+    return [piece + grid.origin for piece in pieces if length_along(piece) >= LEAST_SEAM * length]
 
 
 def _joined(
