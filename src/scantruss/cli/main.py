@@ -9,6 +9,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from functools import partial
 
 from .. import __version__
@@ -67,10 +68,11 @@ def run(words: Sequence[str]) -> None:
         return
     from ..runtime.memory import made_before_set_aside, nothing_collected
 
-    with nothing_collected():
-        command = command_of(words)
-    if command is not None:
-        with made_before_set_aside():
+    with ExitStack() as stack:
+        with nothing_collected():
+            command = command_of(words)
+            stack.enter_context(made_before_set_aside())  # here: the first search after this block would go through all
+        if command is not None:
             command()
 
 

@@ -9,6 +9,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 UNKNOWN_MEMORY = 4e9  # bytes, where a machine reports nothing
+RARELY = 100_000  # objects more until a search for cycles among them
 
 
 def available_memory() -> float:
@@ -31,14 +32,18 @@ def nothing_collected() -> Iterator[None]:
 
 @contextmanager
 def made_before_set_aside() -> Iterator[None]:
-    """Search only what is made meanwhile for cycles: what was imported stays, and each search of all would go through it."""
+    """Search only what is made meanwhile for cycles, and rarely: what was imported stays, as does most that a kernel is loaded with."""
     if gc.get_freeze_count():  # by a block around this one
         yield
         return
+    often = gc.get_threshold()
     gc.freeze()
+    gc.set_threshold(RARELY)
     try:
         yield
     finally:
+        gc.freeze()  # what was made meanwhile grows old, too: a search of the young ones would go through all of it
+        gc.set_threshold(*often)
         gc.unfreeze()
 
 
