@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...runtime.jit import kernel
+from ..geometry.vectors import norm, row, subtract
 
 
 class Curves(NamedTuple):
@@ -121,7 +122,13 @@ def slide(
 @kernel
 def nearest_on_curves(curves: Curves, x: float, y: float, z: float) -> tuple[int, float, float]:
     """Curve, arc length and distance of the place on any curve nearest to a position; curve -1 if there is no curve."""
-    best, curve, arc = np.inf, -1, 0.0
+    return _nearest_within(curves, x, y, z, np.inf)
+
+
+@kernel
+def _nearest_within(curves: Curves, x: float, y: float, z: float, within: float) -> tuple[int, float, float]:
+    """The same of places that are nearer than `within`; curve -1 if there is none."""
+    best, curve, arc = within * within, -1, 0.0
     for c in range(len(curves.total)):
         i, last = curves.start[c], curves.start[c + 1]
         while i < last:  # each turn goes on by a segment or more
@@ -138,6 +145,12 @@ def nearest_on_curves(curves: Curves, x: float, y: float, z: float) -> tuple[int
 
 @kernel
 def distances_from_curves(curves: Curves, places: np.ndarray, distance: np.ndarray) -> None:
-    """Fill in the distance (K,) of each place (K, 3) from the nearest curve."""
+    """Fill in the distance (K,) of each place (K, 3) from the nearest curve; soon done where each place is near the one before."""
+    within = np.inf
     for k in range(len(places)):
-        distance[k] = nearest_on_curves(curves, places[k, 0], places[k, 1], places[k, 2])[2]
+        x, y, z = row(places, k)
+        if k > 0:  # where the one before has its nearest place, up to rounding
+            within = 1.001 * (distance[k - 1] + norm(subtract((x, y, z), row(places, k - 1))))
+        curve, _, distance[k] = _nearest_within(curves, x, y, z, within)
+        if curve < 0:
+            distance[k] = _nearest_within(curves, x, y, z, np.inf)[2]
