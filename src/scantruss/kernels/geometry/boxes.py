@@ -146,9 +146,15 @@ def search(
         for slot in range(len(boxes.first)):
             count = _search_box(boxes, slot, positions, x, y, z, reach, found, count)
         return count
+    square = reach * reach
     for i in range(box_index(boxes, 0, x - reach), box_index(boxes, 0, x + reach) + 1):
+        to_i = _squared_gap(boxes, 0, i, x)
         for j in range(box_index(boxes, 1, y - reach), box_index(boxes, 1, y + reach) + 1):
-            for k in range(box_index(boxes, 2, z - reach), box_index(boxes, 2, z + reach) + 1):
+            to_j = to_i + _squared_gap(boxes, 1, j, y)
+            if to_j > square:
+                continue
+            half = math.sqrt(square - to_j) + NEARLY_IN_BOX * boxes.size[2]
+            for k in range(box_index(boxes, 2, z - half), box_index(boxes, 2, z + half) + 1):
                 count = _search_box(boxes, slot_of(boxes, i, j, k), positions, x, y, z, reach, found, count)
     return count
 
@@ -178,6 +184,7 @@ def nearest(boxes: SearchBoxes, positions: np.ndarray, x: float, y: float, z: fl
         return best
     own = box_index(boxes, 0, x), box_index(boxes, 1, y), box_index(boxes, 2, z)
     best, least = _nearest_in_box(boxes, slot_of(boxes, *own), positions, x, y, z, best, least)
+    reach = min(reach, math.sqrt(least) + NEARLY_IN_BOX * max(boxes.size[0], boxes.size[1], boxes.size[2]))
     for i in range(box_index(boxes, 0, x - reach), box_index(boxes, 0, x + reach) + 1):
         to_i = _squared_gap(boxes, 0, i, x)
         if to_i > least:
