@@ -13,9 +13,9 @@ from small_grids import dome
 from surfaces import distance_to_triangles
 from typed import xyz
 
-from scantruss.check.distances import boxes_of, distances_to_grid
+from scantruss.check.distances import boxes_of, distances_to_grid, feet_over, normals_of, shares_of_corners
 from scantruss.kernels.geometry.triangles import distance_to_triangle
-from scantruss.kernels.mesh.coverage import nearest_distances
+from scantruss.kernels.mesh.coverage import distances_on_triangles, nearest_distances
 from scantruss.kernels.mesh.distances import plane_distances, triangle_boxes
 
 pytestmark = pytest.mark.kernels
@@ -57,6 +57,32 @@ def test_the_nearest_of_all_places_is_found(seed: int, spread: float) -> None:
     found = np.empty(len(others))
     nearest_distances(others, places, boxes_of(places, 0.25), 0.5, found)
     assert found == pytest.approx(cKDTree(places).query(others)[0], rel=1e-12)
+
+
+@settings(max_examples=20)
+@given(some.integers(0, 10_000), some.sampled_from([0.1, 1.0, 30.0]))
+def test_all_over_triangles_they_are_to_the_byte_what_the_places_one_by_one_have(seed: int, spread: float) -> None:
+    rng = np.random.default_rng(seed)
+    places, corners, shares = rng.normal(size=(60, 3)), spread * rng.normal(size=(7, 3, 3)), shares_of_corners(5)
+    found, slow = np.full((len(corners), len(shares)), -1.0), np.empty(len(corners) * len(shares))
+    boxes = boxes_of(places, 0.25)
+    distances_on_triangles(corners, shares, places, boxes, 0.5, found, 2, 6)
+    nearest_distances(np.einsum("pc,tcx->tpx", shares, corners).reshape(-1, 3), places, boxes, 0.5, slow)
+    assert (found[2:6] == slow.reshape(found.shape)[2:6]).all()
+    assert (found[[0, 1, 6]] == -1.0).all()  # another part's
+
+
+@settings(max_examples=20)
+@given(some.integers(0, 10_000))
+def test_heights_and_feet_over_triangles_are_those_of_plain_arrays(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    grid, points = dome(3), 5.0 * rng.normal(size=(40, 3))
+    triangle = rng.integers(0, len(grid.triangles), 40)
+    normal = normals_of(grid)[triangle]
+    slow = ((points - grid.nodes[grid.triangles[triangle, 0]]) * normal).sum(axis=1)
+    height, feet = feet_over(grid, triangle, np.asfortranarray(points))
+    assert height == pytest.approx(slow, abs=1e-13)
+    assert feet == pytest.approx(points - slow[:, None] * normal, abs=1e-13)
 
 
 @given(some.integers(0, 10_000))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..grid.certificate import Fault, place_of
-from .distances import is_over_holes
+from .distances import is_over_holes, shares_of_corners
 
 if TYPE_CHECKING:
     from ..grid.grid import Grid
@@ -41,10 +41,12 @@ def mostly_bare(grid: Grid, samples: SurfaceSamples, feet: FeetOnGrid | None, le
         return []
     looks = ((ON_SIDE_FIRST, LITTLE_BARE), (ON_SIDE, MOST_BARE))
     for on_side, least_share in looks if len(grid.triangles) >= MANY_TRIANGLES else looks[1:]:
-        places, away, area = _bare_places(grid, samples, feet, length, on_side)
+        shares = shares_of_corners(on_side)
+        away, area = _beyond_bare(grid, samples, feet, length, shares)
         bare = away > 0.0
         if bare.mean(axis=1) @ area <= least_share * area.sum():
             return []
+    places = np.einsum("pc,tcx->tpx", shares, grid.nodes[grid.triangles])
     if samples.measured < len(samples.surface.mean):
         bare[bare] = ~is_over_holes(places[bare], samples)
     share = float(bare.mean(axis=1) @ area / area.sum())
@@ -54,22 +56,22 @@ def mostly_bare(grid: Grid, samples: SurfaceSamples, feet: FeetOnGrid | None, le
     return [Fault("bridged", f"covers nothing on {share:.0%} of its area", place_of(worst + samples.origin))]
 
 
-def _bare_places(
-    grid: Grid, samples: SurfaceSamples, feet: FeetOnGrid, length: float, on_side: int
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return places in the triangles (T, P, 3), how much farther each is from all points than a bare one (T, P), and areas (T,)."""
-    shares = np.array([[a, b, on_side - a - b] for a in range(on_side) for b in range(on_side - a)]) + 1.0 / 3.0
-    shares /= shares.sum(axis=1, keepdims=True)
+def _beyond_bare(
+    grid: Grid, samples: SurfaceSamples, feet: FeetOnGrid, length: float, shares: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return how much farther from all points places in the triangles (T, P) are than a bare one, and the areas of these (T,).
+
+    shares : (P, 3) of the corners of a triangle in each place
+    """
     corners = grid.nodes[grid.triangles]
     members = np.full(len(grid.nodes), length) if grid.desired is None else grid.desired
     members = members[grid.triangles].mean(axis=1)
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     few = np.minimum(FEW_POINTS * np.sqrt(_area_of_a_point(grid, feet, 0.5 * area)), FARTHEST_OF_FEW * members)
     least = np.maximum(np.maximum(BARE_FROM * members, few), SPACINGS_BARE * samples.spacing)
-    places = np.einsum("pc,tcx->tpx", shares, corners)
-    away = feet.away(places)
+    away = feet.away_from_triangles(corners, shares)
     away -= np.maximum(least, USUAL_DISTANCES * float(np.median(away)))[:, None]
-    return places, away, area
+    return away, area
 
 
 def _area_of_a_point(grid: Grid, feet: FeetOnGrid, area: np.ndarray) -> np.ndarray:

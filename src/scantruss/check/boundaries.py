@@ -10,7 +10,7 @@ import numpy as np
 from ..constraints.network import curves_of
 from ..grid.certificate import Fault
 from ..kernels.boundary.curves import Curves, distances_from_curves
-from .distances import distances_to_grid, heights_over, nearest_point_distances
+from .distances import distances_to_grid, feet_over, nearest_point_distances
 from .left_out import points_together
 from .limits import HEXAGON_BOUNDARY, NOISES_OFF, Figure
 
@@ -155,7 +155,7 @@ def stops_short(
     chained = curves_of([grid.nodes[chain] for chain in chains], [True] * len(chains))
     places, away = samples.scan[off], found.scan[off]
     beyond = _distances(chained, places) <= away + 1e-6 * members[off]
-    beyond &= np.abs(heights_over(grid, found.triangle[off], places)[0]) <= MOST_HEIGHT_OF_LEVEL * away
+    beyond &= np.abs(feet_over(grid, found.triangle[off], places)[0]) <= MOST_HEIGHT_OF_LEVEL * away
     off = off[beyond]
     if len(off) < FEWEST_BEYOND:
         return []

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..kernels.geometry.boxes import SearchBoxes, new_boxes
 from ..kernels.mesh.coverage import nearest_distances, put_places
-from ..kernels.mesh.distances import nearest_triangles, plane_distances, triangle_boxes
+from ..kernels.mesh.distances import nearest_triangles, plane_distances, put_feet, triangle_boxes
 from ..kernels.surface.mean_surface import mean_offsets
 from ..runtime.parallel import in_parts, side_by_side
 from ..scan.cloud import bounds_of
@@ -20,9 +20,11 @@ if TYPE_CHECKING:
     from ..grid.grid import Grid
     from ..surface.samples import SurfaceSamples
 
-FIRST_REACH = 0.1  # reach of the first search for the nearest triangle; most points have theirs nearer [member lengths]
+FIRST_REACH = (
+    0.05  # reach of the first search for the nearest triangle; most points have theirs nearer [member lengths]
+)
 REACH_GROWTHS = 50  # times that the reach is made four times as large at most: from any place to all of them
-TRIANGLE_BOX = 0.5  # width of the boxes of triangles [member lengths]
+TRIANGLE_BOX = 0.8  # width of the boxes of triangles [member lengths]
 POINT_BOX = 0.2  # width of the boxes of points [member lengths]
 AROUND_NODE = 1.0  # radius within which points are compared with a node [member lengths]
 COMPARED_WITH_NODE = 30  # points a node that are compared with it
@@ -144,6 +146,14 @@ def offsets_from_points(grid: Grid, samples: SurfaceSamples, length: float) -> t
     return bias, scatter
 
 
+def shares_of_corners(on_side: int) -> np.ndarray:
+    """Return the shares (P, 3) of its corners in places all over a triangle, so many along a side."""
+    shares: np.ndarray = (
+        np.array([[a, b, on_side - a - b] for a in range(on_side) for b in range(on_side - a)]) + 1.0 / 3.0
+    )
+    return shares / shares.sum(axis=1, keepdims=True)
+
+
 def normals_of(grid: Grid) -> np.ndarray:
     """Return the unit normals of the triangles (T, 3), zero where they have none."""
     a, b, c = grid.nodes[grid.triangles.T]
@@ -151,10 +161,11 @@ def normals_of(grid: Grid) -> np.ndarray:
     return normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
 
 
-def heights_over(grid: Grid, triangle: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return how high points (K, 3) are over the planes of some triangles (K,), outside positive, and the normals of these (K, 3)."""
-    normal = normals_of(grid)[triangle]
-    return ((points - grid.nodes[grid.triangles[triangle, 0]]) * normal).sum(axis=1), normal
+def feet_over(grid: Grid, triangle: np.ndarray, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return how high points (K, 3) are over the planes of some triangles (K,), outside positive, and their feet on these (K, 3)."""
+    height, feet = np.empty(len(points)), np.empty((len(points), 3))
+    put_feet(np.ascontiguousarray(points), triangle, grid.nodes[grid.triangles[:, 0]], normals_of(grid), height, feet)
+    return height, feet
 
 
 def normals_at_nodes(grid: Grid) -> np.ndarray:

@@ -11,7 +11,7 @@ from ..grid.certificate import Fault, place_of
 from ..kernels.boundary.curves import distances_from_curves
 from ..scan.formats.choose import in_polygon
 from .boundaries import COVERED_WITHIN, boundary_beyond, boundary_left
-from .distances import distances_to_grid
+from .distances import distances_to_grid, shares_of_corners
 from .limits import HEXAGON_BOUNDARY
 
 if TYPE_CHECKING:
@@ -91,10 +91,7 @@ def _bridged_share(grid: Grid, loop: Loop, member: float) -> float:
     corners = (grid.nodes[grid.triangles] - middle) @ axes.T
     reach = float(np.linalg.norm(edge, axis=1).max()) + member
     corners = corners[(np.linalg.norm(corners, axis=2) < reach).any(axis=1)]
-    shares = (
-        np.array([[a, b, ALONG_SIDE - a - b] for a in range(ALONG_SIDE) for b in range(ALONG_SIDE - a)]) + 1.0 / 3.0
-    )
-    places = np.einsum("pc,tcx->tpx", shares / shares.sum(axis=1, keepdims=True), corners)
+    places = np.einsum("pc,tcx->tpx", shares_of_corners(ALONG_SIDE), corners)
     inside = in_polygon(places[..., :2].reshape(-1, 2), [edge[:, :2]]).reshape(places.shape[:2])
     inside &= np.abs(places[..., 2]) < AT_OPENING * member
     one, other = (corners[:, 1] - corners[:, 0]).T, (corners[:, 2] - corners[:, 0]).T

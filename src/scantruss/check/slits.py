@@ -10,10 +10,10 @@ import numpy as np
 
 from ..errors import words_of_number
 from ..grid.certificate import Fault, LeftOut, place_of
-from ..kernels.mesh.coverage import nearest_distances
-from ..runtime.parallel import in_parts
+from ..kernels.mesh.coverage import distances_on_triangles, nearest_distances
+from ..runtime.parallel import in_parts, run_in_parts
 from ..surface.chosen_samples import KEPT
-from .distances import PLACES_MEASURED_PER_THREAD, boxes_of, heights_over, is_over_holes, normals_of
+from .distances import PLACES_MEASURED_PER_THREAD, boxes_of, feet_over, is_over_holes, normals_of, shares_of_corners
 from .gaps import POINTS_AROUND_MIDDLE
 from .left_out import points_together
 from .limits import PLACES_KEPT
@@ -74,6 +74,16 @@ class FeetOnGrid:
             ),
         )
         return distance.reshape(places.shape[:-1])
+
+    def away_from_triangles(self, corners: np.ndarray, shares: np.ndarray) -> np.ndarray:
+        """Return the distance (T, P) of places all over triangles (T, 3, 3), by shares of their corners (P, 3), from the nearest foot."""
+        distance = np.empty((len(corners), len(shares)))
+        least = PLACES_MEASURED_PER_THREAD // len(shares)
+        near = 3.0 * self.spacing
+        run_in_parts(
+            len(corners), least, distances_on_triangles, corners, shares, self.points, self.boxes, near, distance
+        )
+        return distance
 
     def within(self, place: np.ndarray, reach: float) -> int:
         """Return how many points lie within reach of a place (3,)."""
@@ -143,9 +153,8 @@ def feet_on(grid: Grid, samples: SurfaceSamples, found: Distances, length: float
     near = np.flatnonzero((samples.judged == KEPT) & (found.scan <= 0.5 * length))
     if not len(near):
         return None
-    points, triangle = samples.scan[near], found.triangle[near]
-    height, normal = heights_over(grid, triangle, points)
-    points = np.ascontiguousarray(points - height[:, None] * normal)
+    triangle = found.triangle[near]
+    _, points = feet_over(grid, triangle, samples.scan[near])
     boxes = boxes_of(points, max(0.1 * length, 4.0 * samples.spacing))
     return FeetOnGrid(points, boxes, samples.spacing, np.bincount(triangle, minlength=len(grid.triangles)))
 
@@ -163,20 +172,20 @@ def _far_places(
         FINEST_PLACES, math.ceil(float(members.mean()) / feet.spacing), math.isqrt(2 * MOST_PLACES_OF_GRID // len(near))
     )
     along = max(along, FEWEST_ON_SIDE)
-    shares = np.array([[a, b, along - a - b] for a in range(along) for b in range(along - a)]) + 1.0 / 3.0
-    places = np.einsum("pc,tcx->tpx", shares / shares.sum(axis=1, keepdims=True), grid.nodes[grid.triangles[near]])
-    away = feet.away(places)
+    shares, corners = shares_of_corners(along), grid.nodes[grid.triangles]
+    away = feet.away_from_triangles(corners[near], shares)
     usual = np.full(len(grid.triangles), np.inf)
     usual[near] = np.quantile(away, SHARE_NEARER, axis=1)
     least = UNUSUAL * np.sort(usual[_beside(grid)[near]], axis=1)[:, 1]  # of a triangle and those beside it
-    edges = np.linalg.norm(grid.nodes[grid.triangles] - grid.nodes[np.roll(grid.triangles, 1, axis=1)], axis=2)
+    edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
     step = edges.mean(axis=1) / along
     at, which = np.nonzero(
         (away > np.maximum(least, LEAST_STEPS * step[near])[:, None]) & (away <= WIDEST_HALF * members[:, None])
     )
     every = len(at) // MOST_FAR_PLACES + 1
     at, which = at[::every], which[::every]
-    return places[at, which], near[at], away[at, which], step * math.sqrt(every), least[at]
+    places = (shares[which, :, None] * corners[near[at]]).sum(axis=1)
+    return places, near[at], away[at, which], step * math.sqrt(every), least[at]
 
 
 def _beside(grid: Grid) -> np.ndarray:

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..errors import words_of_number
 from ..grid.certificate import Fault, place_of
-from .distances import heights_over
+from .distances import feet_over
 from .left_out import points_together
 from .limits import NOISES_OFF, PLACES_KEPT
 
@@ -40,13 +40,19 @@ def unfollowed_steps(
     near = np.flatnonzero(chosen & (found.scan <= 0.5 * members))
     if not len(near):
         return []
-    points, triangle, member = samples.scan[near], found.triangle[near], float(members[near].mean())
-    height, normal = heights_over(grid, triangle, points)
+    points, member = samples.scan[near], float(members[near].mean())
+    height, feet = feet_over(grid, found.triangle[near], points)
     column = max(SIZE_OF_COLUMN[0] * samples.spacing, SIZE_OF_COLUMN[1] * member)
     least = max(HEIGHT_OF_STEP[0] * column, HEIGHT_OF_STEP[1] * member) + NOISES_OFF * float(np.median(found.noise))
-    if np.abs(height).max() <= 0.5 * least:  # then no column is as high
+    high = np.abs(height) > 0.5 * least  # one of the points of a step is
+    if not high.any():
         return []
-    order, begin, end = _columns(points - height[:, None] * normal, height, column)
+    number = _columns(feet, column)
+    near_high = np.isin(number, number[high])
+    points, height, number = points[near_high], height[near_high], number[near_high]
+    order = np.lexsort((height, number))
+    begin = np.flatnonzero(np.diff(number[order], prepend=-1))
+    end = np.append(begin[1:], len(order))
     spared = (end - begin >= SPARED_FROM).astype(np.int64)
     step = height[order[end - 1 - spared]] - height[order[begin + spared]]
     high = np.flatnonzero((step > least) & (end - begin >= FEWEST_IN_COLUMN))
@@ -73,15 +79,10 @@ def unfollowed_steps(
     return [Fault("unfollowed", words, at, tuple(others))]
 
 
-def _columns(feet: np.ndarray, height: np.ndarray, width: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return points by column and height (N,), and where each column begins and ends in that order (C,).
-
-    feet : (N, 3) of the points on the grid; height : (N,) over it; width : of a column [scan unit]
-    """
+def _columns(feet: np.ndarray, width: float) -> np.ndarray:
+    """Return the number of the column of each point (N,), by its foot on the grid (N, 3); width : of a column [scan unit]."""
     cell = np.floor(feet / width).astype(np.int64)
     cell -= cell.min(axis=0)
     across = cell.max(axis=0) + 1
-    number = (cell[:, 0] * across[1] + cell[:, 1]) * across[2] + cell[:, 2]
-    order = np.lexsort((height, number))
-    begin = np.flatnonzero(np.diff(number[order], prepend=-1))
-    return order, begin, np.append(begin[1:], len(order))
+    number: np.ndarray = (cell[:, 0] * across[1] + cell[:, 1]) * across[2] + cell[:, 2]
+    return number

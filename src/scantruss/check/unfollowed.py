@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import words_of_number
 from ..grid.certificate import Fault, place_of
 from ..grid.line_sets import RIDGE, sets_of
-from .distances import distances_to_grid, heights_over
+from .distances import distances_to_grid, feet_over
 from .folds import fold_angles
 from .left_out import points_together
 from .limits import NOISES_OFF, PLACES_KEPT
@@ -117,7 +117,7 @@ def off_mean_surface(
 ) -> list[Fault]:
     """Return a fault where the mean surface of a rough scan is not followed either; parameters as of `unfollowed_parts`."""
     triangle, member = found.triangle[chosen], members[chosen]
-    height = heights_over(grid, triangle, samples.scan[chosen])[0] / member
+    height = feet_over(grid, triangle, samples.scan[chosen])[0] / member
     count = np.maximum(np.bincount(triangle, minlength=len(grid.triangles)), 1)
     middle = np.abs(np.bincount(triangle, height, minlength=len(grid.triangles)) / count)[triangle]
     share = float(np.mean(middle > OFF_MEAN)) if len(middle) else 0.0

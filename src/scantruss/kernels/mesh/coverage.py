@@ -8,7 +8,7 @@ import numpy as np
 
 from ...runtime.jit import kernel
 from ..geometry.boxes import SearchBoxes, nearest, put
-from ..geometry.vectors import norm, row, subtract
+from ..geometry.vectors import Vector, norm, row, subtract
 
 MOST_DOUBLINGS = 50  # times that a reach is doubled at most: from any box to all of them
 
@@ -29,12 +29,39 @@ def nearest_distances(
     boxes : the places (P, 3) by box, at least one. Inf if the nearest is beyond `MOST_DOUBLINGS` of the first radius.
     """
     for q in range(len(others)):
-        x, y, z = row(others, q)
-        reach = near
-        found = nearest(boxes, places, x, y, z, reach)
-        for _ in range(MOST_DOUBLINGS):
-            if found >= 0:
-                break
-            reach *= 2.0
-            found = nearest(boxes, places, x, y, z, reach)
-        distance[q] = norm(subtract(row(places, found), (x, y, z))) if found >= 0 else math.inf
+        distance[q] = _nearest_distance(row(others, q), places, boxes, near)
+
+
+@kernel
+def _nearest_distance(other: Vector, places: np.ndarray, boxes: SearchBoxes, reach: float) -> float:
+    """Distance from the nearest place; see `nearest_distances`."""
+    found = nearest(boxes, places, other[0], other[1], other[2], reach)
+    for _ in range(MOST_DOUBLINGS):
+        if found >= 0:
+            break
+        reach *= 2.0
+        found = nearest(boxes, places, other[0], other[1], other[2], reach)
+    return norm(subtract(row(places, found), other)) if found >= 0 else math.inf
+
+
+@kernel
+def distances_on_triangles(
+    corners: np.ndarray,
+    shares: np.ndarray,
+    places: np.ndarray,
+    boxes: SearchBoxes,
+    near: float,
+    distance: np.ndarray,
+    begin: int,
+    end: int,
+) -> None:
+    """Fill in the distance (T, Q) of points in each triangle from `begin` to `end` - 1 from the nearest place; see `nearest_distances`.
+
+    corners : (T, 3, 3) of the triangles; shares : (Q, 3) of these in each point
+    """
+    for t in range(begin, end):
+        a, b, c = row(corners[t], 0), row(corners[t], 1), row(corners[t], 2)
+        for q in range(len(shares)):
+            u, v, w = row(shares, q)
+            x, y, z = (u * a[0] + v * b[0] + w * c[0], u * a[1] + v * b[1] + w * c[1], u * a[2] + v * b[2] + w * c[2])
+            distance[t, q] = _nearest_distance((x, y, z), places, boxes, near)

@@ -11,7 +11,7 @@ from ...runtime.jit import kernel
 from ..geometry.boxes import SearchBoxes, box_index, is_wide, new_boxes, put_into, slot_of
 from ..geometry.planes import plane_of
 from ..geometry.triangles import distance_to_triangle
-from ..geometry.vectors import Vector, dot, norm, row, subtract
+from ..geometry.vectors import Vector, along, dot, norm, put_vector, row, subtract
 
 MOST_ENTRIES = 1000  # most entries of a triangle on average, beyond which boxes are larger: some triangles are far longer than others
 BOX_GROWTHS = 60  # times that boxes are made twice as large at most: from any size to one box
@@ -192,3 +192,22 @@ def plane_distances(
         distance[q] = min(abs(dot(subtract(away, mean), normal)), norm(away))
         noise[q] = math.sqrt(off / wanted)
         reach = max(REACH_GROWS * math.sqrt(squares[wanted - 1]), LEAST_REACH * near)
+
+
+@kernel
+def put_feet(
+    points: np.ndarray,
+    which: np.ndarray,
+    corners: np.ndarray,
+    normals: np.ndarray,
+    height: np.ndarray,
+    feet: np.ndarray,
+) -> None:
+    """Fill in how high each point (K, 3) is over a plane (K,), `which`, and its foot on that (K, 3).
+
+    corners, normals : (T, 3) a place in each plane, and its unit normal
+    """
+    for k in range(len(points)):
+        point, normal = row(points, k), row(normals, which[k])
+        height[k] = dot(subtract(point, row(corners, which[k])), normal)
+        put_vector(feet[k], along(point, -height[k], normal))
