@@ -60,10 +60,13 @@ def test_the_nearest_of_all_places_is_found(seed: int, spread: float) -> None:
 
 
 @settings(max_examples=20)
-@given(some.integers(0, 10_000), some.sampled_from([0.1, 1.0, 30.0]))
-def test_all_over_triangles_they_are_to_the_byte_what_the_places_one_by_one_have(seed: int, spread: float) -> None:
+@given(some.integers(0, 10_000), some.sampled_from([0.1, 1.0, 30.0]), some.sampled_from([60, 2000]))
+def test_all_over_triangles_they_are_to_the_byte_what_the_places_one_by_one_have(
+    seed: int, spread: float, count: int
+) -> None:
+    """Of many places too few are near a triangle, or too many, to be compared with all points in it."""
     rng = np.random.default_rng(seed)
-    places, corners, shares = rng.normal(size=(60, 3)), spread * rng.normal(size=(7, 3, 3)), shares_of_corners(5)
+    places, corners, shares = rng.normal(size=(count, 3)), spread * rng.normal(size=(7, 3, 3)), shares_of_corners(9)
     found, slow = np.full((len(corners), len(shares)), -1.0), np.empty(len(corners) * len(shares))
     boxes = boxes_of(places, 0.25)
     distances_on_triangles(corners, shares, places, boxes, 0.5, found, 2, 6)

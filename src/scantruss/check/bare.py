@@ -41,12 +41,10 @@ def mostly_bare(grid: Grid, samples: SurfaceSamples, feet: FeetOnGrid | None, le
         return []
     looks = ((ON_SIDE_FIRST, LITTLE_BARE), (ON_SIDE, MOST_BARE))
     for on_side, least_share in looks if len(grid.triangles) >= MANY_TRIANGLES else looks[1:]:
-        shares = shares_of_corners(on_side)
-        away, area = _beyond_bare(grid, samples, feet, length, shares)
+        places, away, area = _bare_places(grid, samples, feet, length, on_side)
         bare = away > 0.0
         if bare.mean(axis=1) @ area <= least_share * area.sum():
             return []
-    places = np.einsum("pc,tcx->tpx", shares, grid.nodes[grid.triangles])
     if samples.measured < len(samples.surface.mean):
         bare[bare] = ~is_over_holes(places[bare], samples)
     share = float(bare.mean(axis=1) @ area / area.sum())
@@ -56,22 +54,20 @@ def mostly_bare(grid: Grid, samples: SurfaceSamples, feet: FeetOnGrid | None, le
     return [Fault("bridged", f"covers nothing on {share:.0%} of its area", place_of(worst + samples.origin))]
 
 
-def _beyond_bare(
-    grid: Grid, samples: SurfaceSamples, feet: FeetOnGrid, length: float, shares: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return how much farther from all points places in the triangles (T, P) are than a bare one, and the areas of these (T,).
-
-    shares : (P, 3) of the corners of a triangle in each place
-    """
+def _bare_places(
+    grid: Grid, samples: SurfaceSamples, feet: FeetOnGrid, length: float, on_side: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return places in the triangles (T, P, 3), how much farther each is from all points than a bare one (T, P), and areas (T,)."""
     corners = grid.nodes[grid.triangles]
     members = np.full(len(grid.nodes), length) if grid.desired is None else grid.desired
     members = members[grid.triangles].mean(axis=1)
     area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     few = np.minimum(FEW_POINTS * np.sqrt(_area_of_a_point(grid, feet, 0.5 * area)), FARTHEST_OF_FEW * members)
     least = np.maximum(np.maximum(BARE_FROM * members, few), SPACINGS_BARE * samples.spacing)
-    away = feet.away_from_triangles(corners, shares)
+    places = np.einsum("pc,tcx->tpx", shares_of_corners(on_side), corners)
+    away = feet.away(places)
     away -= np.maximum(least, USUAL_DISTANCES * float(np.median(away)))[:, None]
-    return away, area
+    return places, away, area
 
 
 def _area_of_a_point(grid: Grid, feet: FeetOnGrid, area: np.ndarray) -> np.ndarray:

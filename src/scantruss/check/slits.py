@@ -79,7 +79,7 @@ class FeetOnGrid:
         """Return the distance (T, P) of places all over triangles (T, 3, 3), by shares of their corners (P, 3), from the nearest foot."""
         distance = np.empty((len(corners), len(shares)))
         least = PLACES_MEASURED_PER_THREAD // len(shares)
-        near = 3.0 * self.spacing
+        near = 2.0 * self.spacing
         run_in_parts(
             len(corners), least, distances_on_triangles, corners, shares, self.points, self.boxes, near, distance
         )
@@ -155,7 +155,7 @@ def feet_on(grid: Grid, samples: SurfaceSamples, found: Distances, length: float
         return None
     triangle = found.triangle[near]
     _, points = feet_over(grid, triangle, samples.scan[near])
-    boxes = boxes_of(points, max(0.1 * length, 4.0 * samples.spacing))
+    boxes = boxes_of(points, max(0.15 * length, 6.0 * samples.spacing))
     return FeetOnGrid(points, boxes, samples.spacing, np.bincount(triangle, minlength=len(grid.triangles)))
 
 
