@@ -10,6 +10,7 @@ from test_wide_ridges import ALL_TWELVE, HALF, SIZE, rounded_box
 from scantruss import Grid, Settings, grid_from_points
 from scantruss.constraints.ridges import find_ridges
 from scantruss.grid.line_sets import RIDGE, sets_of
+from scantruss.kernels.mesh.point_location import facing_sample
 from scantruss.scan.cloud import PointCloud
 from scantruss.surface.samples import sample_surface
 
@@ -58,13 +59,26 @@ def test_a_narrow_lip_is_one_line_along_its_middle(wall: float, rounded: bool, n
 
 
 @compiled_only
-@pytest.mark.parametrize(("wall", "rounded"), [(0.5, False), (0.8, True)])
-def test_a_bowl_has_its_lip_as_a_chain(wall: float, rounded: bool) -> None:
-    """It was refused with a wall of half a member, and a round lip was a zigzag."""
-    grid = grid_from_points(bowl(wall, rounded), Settings(length=1.0))
+@pytest.mark.parametrize(
+    ("wall", "rounded", "noise"), [(0.5, False, 0.0), (0.5, True, 0.0), (0.5, False, 0.03), (0.8, True, 0.0)]
+)
+def test_a_bowl_has_its_lip_as_a_chain(wall: float, rounded: bool, noise: float) -> None:
+    """It was refused with a wall of half a member, as nodes beside the lip went to the far side, and a round lip was a zigzag."""
+    grid = grid_from_points(bowl(wall, rounded, noise), Settings(length=1.0))
     (length,) = ridge_lengths(grid)
     assert abs(length / (2.0 * np.pi * (RADIUS - 0.5 * wall)) - 1.0) < 0.03
     assert grid.quality.length_cv < 0.07 and grid.topology.boundary_loops == 0
+
+
+def test_a_node_lies_on_the_side_of_a_wall_that_faces_as_it_does() -> None:
+    cloud = PointCloud.from_array(bowl(0.5, False))
+    samples = sample_surface(cloud, Settings(length=1.0))
+    surface, place = samples.surface, np.array([0.0, RADIUS - 0.3, -1.0]) - samples.origin
+    far, near = np.linalg.norm(surface.mean - place, axis=1), (0.0, 1.0, 0.0)
+    inner = int(np.where(surface.normals @ near < -0.5, far, np.inf).argmin())
+    found = facing_sample(surface, (place[0], place[1], place[2]), near, inner)
+    assert surface.normals[found] @ near > 0.5
+    assert facing_sample(surface, (place[0], place[1], place[2]), near, found) == found
 
 
 def test_a_wide_lip_is_two_lines() -> None:
