@@ -17,7 +17,8 @@ from scantruss import Grid, PointCloud, Settings, grid_from_points
 from scantruss.boundary.find import find_boundary
 from scantruss.check.certify import Judged, judge
 from scantruss.constraints.find import find_constraints, wanted_ridges
-from scantruss.constraints.fold_tracing import Tracer, is_even, parts_of_fold
+from scantruss.constraints.fold_tracing import Tracer
+from scantruss.constraints.lines_of_folds import is_even, parts_of_fold
 from scantruss.constraints.ridge_ends import Ridge, join_ends
 from scantruss.constraints.ridges import find_ridges
 from scantruss.errors import FrontError

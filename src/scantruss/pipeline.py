@@ -13,14 +13,14 @@ import numpy as np
 
 from .attempts.course import AttemptCourse
 from .attempts.limit import AttemptLimit
-from .attempts.looks import follows_better
+from .attempts.looks import follows_better, follows_ridges_as_well
 from .attempts.table import Attempt
 from .boundary.find import find_boundary
 from .candidates import advance_fronts, best_that_passes, improve_fronts
 from .cells.make import settings_of_triangles, with_cells
 from .cells.symmetric_grids import symmetric_grid, symmetric_hexagons
 from .check.unfollowed import crests_cut_off
-from .constraints.find import find_constraints, wide_folds
+from .constraints.find import find_constraints, made_folds, wide_folds
 from .errors import CertificateError, FrontError, ScanTrussError
 from .front.orientation_field import orientation_fields
 from .grid.grid import Grid
@@ -151,7 +151,9 @@ def make_grid(cloud: PointCloud, attempt: Attempt, *, progress: Progress | None 
 
 
 def make_grid_with_wide_ridges(cloud: PointCloud, attempt: Attempt, *, progress: Progress | None = None) -> Grid:
-    """Return the grid of one attempt; where it cuts off the crests of wide folds, with ridges there, if that follows the scan better.
+    """Return the grid of one attempt, with ridges along wide folds where that follows the scan better.
+
+    Where they are so even that they were made, it need only follow it as well. Others are tried where their crests are cut off.
 
     For effort `best` grids of effort `normal` decide it, so that the longer search starts from no worse.
 
@@ -169,11 +171,14 @@ def make_grid_with_wide_ridges(cloud: PointCloud, attempt: Attempt, *, progress:
     seen = _unseen(progress) if is_long else progress
     first = replace(attempt, settings=attempt.settings.replace(effort="normal")) if is_long else attempt
     plain = make_grid(cloud, first, progress=seen)
-    wide = crests_cut_off(plain, crests, settings.length)
-    if wide:
+    made = made_folds(samples, settings)
+    every = tuple(sorted({*made, *crests_cut_off(plain, crests, settings.length)}))
+    for wide, is_taken in ((every, follows_better), (made, follows_ridges_as_well)):
+        if not wide or (wide == made and is_taken is follows_better):
+            continue
         with suppress(FrontError):
             folded = make_grid(cloud, replace(first, wide=wide), progress=seen)
-            if follows_better(folded, plain):
+            if is_taken(folded, plain):
                 return make_grid(cloud, replace(attempt, wide=wide), progress=progress) if is_long else folded
     return make_grid(cloud, attempt, progress=progress) if is_long else plain
 

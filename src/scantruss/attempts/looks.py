@@ -26,6 +26,8 @@ SAID_BESIDE_RODS = ("aside", "far", "peak")  # kinds of warnings of a grid that 
 BESIDE_RODS = 0.5  # distance from a rod within which the place of a warning is beside it [member lengths]
 # by how much nearer a hundredth of the points must lie, in members, where members are unevener by 1 (std of their lengths / mean)
 NEARER_FOR_UNEVENER = 2.0
+# by how much the members of a grid that follows more ridges may be unevener, and how many times as far a hundredth of the points off it
+UNEVENER_BESIDE_RIDGES, FARTHER_BESIDE_RIDGES = 0.03, 1.1
 POOR_MEMBERS = {"angle", "short", "long", "folded"}  # kinds of warnings
 
 
@@ -178,6 +180,18 @@ def follows_better(grid: Grid, other: Grid) -> bool:
         return False
     nearer = (known.scan_distance.p99 - found.scan_distance.p99) / found.reach / 2.0
     return nearer > NEARER_FOR_UNEVENER * max(_variation(grid) - _variation(other), 0.0)
+
+
+def follows_ridges_as_well(grid: Grid, other: Grid) -> bool:
+    """Whether a grid that follows more ridges than another one is nearer to the scan or hardly off it more, and no poorer."""
+    found, known = grid.certificate, other.certificate
+    if follows_better(grid, other):
+        return True
+    if found is None or known is None or found.scan_distance is None or known.scan_distance is None:
+        return False
+    is_even = _variation(grid) <= _variation(other) + UNEVENER_BESIDE_RIDGES
+    is_near = found.scan_distance.p99 <= FARTHER_BESIDE_RIDGES * known.scan_distance.p99
+    return is_even and is_near and _poor_members(found) <= _poor_members(known)
 
 
 def _poor_members(certificate: Certificate) -> int:

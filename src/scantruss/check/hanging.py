@@ -68,7 +68,9 @@ def nodes_off_sheets(grid: Grid, samples: SurfaceSamples, length: float) -> list
     standing = np.union1d(
         _spikes(grid, samples, desired, LESS_STEEP_MEMBER_SINE, EVEN_FLAT_COSINE), _on_masts(grid, samples, desired)
     )
-    nodes = np.setdiff1d(standing, hanging)
+    nodes = np.setdiff1d(
+        standing, np.union1d(hanging, grid.lines)
+    )  # the lip of a thin body is no mast: all members leave it
     return _fault("off sheet", "has a node on points that stand off the sheet around it", grid, nodes)
 
 

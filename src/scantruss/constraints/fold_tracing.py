@@ -12,10 +12,25 @@ from ..kernels.mesh.point_location import nearest_sample
 from ..kernels.surface import ridges as kernels
 from ..kernels.surface.local_surface import walk
 from ..kernels.surface.ridges import FOLD
-from ..kernels.surface.wide_folds import fit_wide_fold
+from ..kernels.surface.wide_folds import fit_wide_fold, keep_wide_folds
 from ..runtime.jit import new_record
 from ..runtime.watch import Watch
 from ..surface.near_scan import distance_from_scan
+from .lines_of_folds import (
+    FOLD_STRIDE,
+    GAIN_OF_SURE,
+    SHARPEST_EDGE,
+    SHARPEST_FOLD_ANGLE,
+    SHARPEST_LIP,
+    TURNS_BACK,
+    WIDE_UNEVEN,
+    is_clear_on_rough,
+    is_even,
+    is_sure,
+    parts_of_fold,
+    smoothed,
+    squares_between,
+)
 
 if TYPE_CHECKING:
     from ..settings import Settings
@@ -30,15 +45,10 @@ MOST_POINTS_OF_FIT = 6000  # points that there is room for
 FEWEST_OF_A_SAMPLE = 3.0  # of each sample at least
 FOLD_FITS_WITHIN = 0.02  # distance of the points from a fold up to which no smaller radius is tried [member lengths]
 FOLD_AHEAD, WIDE_FOLD_AHEAD = 0.6, 1.0  # farthest that the next crest lies from where it was expected [steps]
-FOLD_STRIDE = 0.25  # step from place to place along a fold [member lengths]
 LEAST_TURN_SHARE = 0.25  # share of the ridge angle by which neighbouring normals must differ where a fold is looked for
 LIKELY_FOLD = 0.35  # share of the ridge angle above which a fold is looked at more closely
 WEAK_FOLD = 0.6  # share of the ridge angle from which a fold is followed
 SHARP_SHARE = 1.5  # share of it from which no larger radius is tried
-NEARLY_FULL_ANGLE = 0.9  # share of the ridge angle that counts as full: noise takes some away
-LEAST_FULL_SHARE = 0.55  # least share of a ridge that has the full angle, unless that part is long enough
-LONG_FULL = 2.5  # length of a ridge with the full angle that is enough, whatever its share [member lengths]
-GAIN_OF_FILLET = 90.0  # median gain of a line of wide folds, at least
 FADED_FOLD = 0.2  # a fold ends where its angle has fallen to this share of the ridge angle
 FOLD_OVER_SMOOTH = 10.0  # how much better a fold must fit than a smooth surface (F statistic)
 ROUGHEST_SIDE = 0.12  # points farther from a fold than this follow neither side [member lengths]
@@ -47,12 +57,12 @@ FOLD_BESIDE, WIDE_FOLD_BESIDE = (
     0.5,
     0.8,
 )  # farthest that the crest lies from the place at which a fold was found [member lengths]
+WIDE_LOOK_SPACING = 0.5  # the same for wide folds [member lengths]
 MOST_SAMPLES = 4000  # most samples from which folds are looked for, the sharpest first
 FALSE_FOLDS_OF_ROUGH = 12  # places in a row that look folded and are no ridge, after which only long ridges count
 MOST_FALSE_FOLDS = 80  # such places in a row after which the search stops
-LEAST_ROUGH_RIDGE = 6.0  # least length of a line of folds on a rough scan [member lengths]
-ROUGH_SHARE = 1.4  # share of the ridge angle by which half of such a line is folded at least
-MISSED_PLACES = 2  # places in a row at which a fold may not be seen and still goes on
+# places in a row at which a fold may not be seen and still goes on: beside a corner, a wide one is not for the width of its sides
+MISSED_PLACES, WIDE_MISSED_PLACES = 2, 4
 LEAST_TURN_COSINE = 0.94  # least cosine of the turn of a fold from place to place
 PLACES_OF_SHORTEST_RING = 6  # places along the shortest ring
 MOST_PLACES_OF_FOLD = 20_000  # most places along a fold
@@ -64,6 +74,8 @@ LOOK_AROUND = 0.12  # radius within which the scan is looked for below a ridge [
 SHARE_BELOW = 0.25  # share of that radius by which the scan may lie below a sharp ridge
 FAR_OFF = 0.08  # a place on a ridge farther from all points than this is moved to the nearest [member lengths]
 FEWEST_AROUND = 5  # fewest points that show whether a place lies off them
+HALF_NARROW_LIP = 0.3  # half the width of a lip below which one line stands for both of its edges [member lengths]
+PLACES_OF_EDGE = 12  # places along a line of folds, about, at which a lip is looked for
 PLACES_BETWEEN_CORNERS = (0.3, 0.5, 0.7)  # shares of the way between two corners at which a short ridge must be seen
 
 
@@ -95,12 +107,9 @@ class Tracer:
         fold, best = new_record(FOLD), None
         x, y, z = place.tolist()
         a, b, c = towards.tolist()
-        if (
-            self.wide
-            and fit_wide_fold(self.surface, sample, (x, y, z), (a, b, c), fold)
-            and fold.gain >= FOLD_OVER_SMOOTH
-        ):
-            return fold
+        if self.wide:
+            fits = fit_wide_fold(self.surface, sample, (x, y, z), (a, b, c), fold)
+            return fold if fits and fold.gain >= FOLD_OVER_SMOOTH else None
         for number, (radius, most) in enumerate(zip(self.radii, self.most, strict=True)):
             if number < first or (number >= FIRST_NEAR_CORNERS and best is not None and self._is_clear(best)):
                 continue
@@ -129,15 +138,21 @@ class Tracer:
 
     def trace_wide(self, narrow: list[np.ndarray]) -> list[np.ndarray]:
         """The same of folds that turn over nearly a member, away from the sharp ones of the lines that are known."""
-        sharp = [folds for folds in narrow if is_sharp(folds, self.angle)]
-        seeds = self._seeds
-        places, away = self.surface.mean[seeds], np.ones(len(seeds), bool)
-        for folds in sharp:
-            away &= squares_between(places, folds).min(axis=1) > self.length**2
         self.wide = True
-        found = self._trace_from(seeds[away], sharp)[len(sharp) :]
+        sharp = [folds for folds in narrow if is_sure(folds, self.angle) and not self._edges_narrow_lip(folds)]
+        found = self._trace_from(self._wide_seeds(sharp), sharp)[len(sharp) :]
         self.wide = False
-        return [folds for folds in found if is_fillet(folds, self.angle)]
+        return [folds for folds in found if is_sure(folds, self.angle)]
+
+    def _edges_narrow_lip(self, folds: np.ndarray) -> bool:
+        """Whether most of a line of folds (K,) FOLD is an edge of a lip so narrow that one line along its middle stands for both."""
+        some, beside = folds[:: max(len(folds) // PLACES_OF_EDGE, 1)], 0
+        for fold in some:
+            sample = nearest_sample(self.surface, *fold.place.tolist())
+            lip = self.fold_at(sample, fold.place, fold.ahead)
+            if lip is not None and lip.bend >= TURNS_BACK:
+                beside += bool(np.linalg.norm(lip.place - fold.place) < HALF_NARROW_LIP * self.length)
+        return 2 * beside > len(some)
 
     def _trace_from(self, seeds: np.ndarray, known: list[np.ndarray]) -> list[np.ndarray]:
         """The lines of folds that are known, and those around samples (K,) that belong to none of them."""
@@ -163,7 +178,8 @@ class Tracer:
                 self.watch.note(len(folds), folds["place"][-1] + self.origin)
                 slack = WIDE_UNEVEN if self.wide else 0.0
                 parts = parts_of_fold(folds)
-                even = [part for part in parts if is_even(part, WEAK_FOLD * self.angle, self.sharpest, slack)]
+                sharpest = SHARPEST_LIP if self.wide else self.sharpest
+                even = [part for part in parts if is_even(part, WEAK_FOLD * self.angle, sharpest, slack)]
                 even = [part for part in even if not rough or is_clear_on_rough(part, self.angle)]
                 ridges += even
                 misses = 0 if even else misses
@@ -190,17 +206,28 @@ class Tracer:
         return moved
 
     @cached_property
-    def _seeds(self) -> np.ndarray:
+    def _likely(self) -> np.ndarray:
         """Samples (K,) at which the normals turn so fast that there may be a ridge, the sharpest first."""
         bends = np.empty(len(self.surface.mean))
         kernels.bends_of_samples(self.surface, bends)
         likely = np.flatnonzero(bends < np.cos(LEAST_TURN_SHARE * self.angle))
-        likely = likely[np.argsort(bends[likely], kind="stable")[:MOST_SAMPLES]]
-        if not len(likely):
-            return likely
-        note = np.zeros(len(likely), np.int64)
+        return likely[np.argsort(bends[likely], kind="stable")[:MOST_SAMPLES]]
+
+    @cached_property
+    def _seeds(self) -> np.ndarray:
+        """Those (K,) around which a few points look folded."""
+        likely, note = self._likely.copy(), np.zeros(len(self._likely), np.int64)
         least, apart = LIKELY_FOLD * self.angle, LOOK_SPACING * self.length
         return likely[: kernels.keep_folded(self.surface, likely, self.radii[0], least, apart, self.buffer, note)]
+
+    def _wide_seeds(self, sharp: list[np.ndarray]) -> np.ndarray:
+        """Those (K,) away from sharp folds at which both sides of a wide fold are seen."""
+        places, away = self.surface.mean[self._likely], np.ones(len(self._likely), bool)
+        for folds in sharp:
+            away &= squares_between(places, folds).min(axis=1) > self.length**2
+        likely, note = self._likely[away], np.zeros(int(away.sum()), np.int64)
+        least, apart = WEAK_FOLD * self.angle, WIDE_LOOK_SPACING * self.length
+        return likely[: keep_wide_folds(self.surface, likely, apart, least, GAIN_OF_SURE, note)]
 
     def _follow(self, sample: int, fold: np.record, others: list[np.ndarray]) -> np.ndarray:
         """Go along a fold to both sides until it fades, leaves the scan or comes to another; back to its start where it is a ring."""
@@ -233,7 +260,7 @@ class Tracer:
         known, own = np.concatenate([np.zeros((0, 3)), *others]), np.empty((MOST_PLACES_OF_FOLD, 3))
         meets = FOLDS_MEET_WITHIN * self.length
         missed = 0
-        while len(steps) < MOST_PLACES_OF_FOLD and missed <= MISSED_PLACES:
+        while len(steps) < MOST_PLACES_OF_FOLD and missed <= (WIDE_MISSED_PLACES if self.wide else MISSED_PLACES):
             stride = (1 + missed) * FOLD_STRIDE * self.length
             place = at.place + stride * ahead
             x, y, z = place.tolist()
@@ -286,99 +313,3 @@ class Tracer:
         off = -low if low > 0.0 else (-high if high < 0.0 else 0.0)
         moved: np.ndarray = ahead * (off if abs(off) > self.fits + SHARE_BELOW * radius else 0.0)
         return moved
-
-
-def squares_between(places: np.ndarray, folds: np.ndarray) -> np.ndarray:
-    """Squared distances (M, K) of places (M, 3) from those of folds (K,) FOLD."""
-    squares: np.ndarray = ((places[:, None] - folds["place"]) ** 2).sum(axis=2)
-    return squares
-
-
-def runs_along(folds: np.ndarray, others: list[np.ndarray], length: float) -> bool:
-    """Whether most of a line of folds (K,) FOLD lies within a length of others."""
-    if not others:
-        return False
-    nearest = np.min([squares_between(folds["place"], other).min(axis=1) for other in others], axis=0)
-    return bool((nearest < length**2).mean() > 0.5)
-
-
-def is_fillet(folds: np.ndarray, angle: float) -> bool:
-    """Whether a line of wide folds (K,) FOLD turns by the ridge angle, between sides so even that it is a fillet."""
-    return bool(np.median(folds["bend"]) >= angle and np.median(folds["gain"]) >= GAIN_OF_FILLET)
-
-
-def is_sharp(folds: np.ndarray, angle: float) -> bool:
-    """Whether a line of folds (K,) FOLD has the full angle along enough of it."""
-    full = folds["bend"] >= NEARLY_FULL_ANGLE * angle
-    size = float(full.sum()) * FOLD_STRIDE
-    return bool(size >= LONG_FULL or (size >= LEAST_FULL_LENGTH and full.mean() >= LEAST_FULL_SHARE))
-
-
-PLACES_OF_TURN = 3  # places on both sides from which the turn of a line is taken
-CORNER_TURN = 25.0  # by how much a line turns more in a corner than before and after it [degree]
-SHORTEST_LINE_OF_FOLDS = 1.0  # least length of a line of folds [member lengths]
-LEAST_FULL_LENGTH = 0.75  # least length of it with the full angle [member lengths]
-SHARPEST_FOLD_ANGLE = 125.0  # a surface that bends by more is not folded but turns back: two sheets [degree]
-SHARPEST_EDGE = 155.0  # most that a surface bends at a fold where sharp edges of bodies are looked for [degree]
-# median change of the bend from place to place, at most, of folds by up to 50 degrees and by 70 or more [degree]: blunt crests of nature
-# are as sharp as blunt ridges that were made, but not as even
-EVEN_FOLDS = (0.5, 3.5)
-BLUNT_FOLD, ACUTE_FOLD = 50.0, 70.0  # angles of folds between which the allowed change of the bend grows [degree]
-BY_NOISE = 0.2  # change of the bend that noise explains, for the root of the gain 1 [radian]
-WIDE_UNEVEN = 2.0  # further change of the bend that is allowed of wide folds, whose places are less certain [degree]
-SURE_GAIN = 25.0  # median gain, at least (F statistic)
-
-
-def parts_of_fold(folds: np.ndarray) -> list[np.ndarray]:
-    """The parts (K,) FOLD of a line of folds between its corners, where its direction turns more than before and after."""
-    count = len(folds)
-    if count < 4 * PLACES_OF_TURN:
-        return [folds]
-    ahead = folds["place"][PLACES_OF_TURN:] - folds["place"][:-PLACES_OF_TURN]
-    ahead /= np.maximum(np.linalg.norm(ahead, axis=1), 1e-300)[:, None]
-    turn = np.zeros(count)
-    turn[PLACES_OF_TURN : count - PLACES_OF_TURN] = np.arccos(
-        np.clip((ahead[PLACES_OF_TURN:] * ahead[:-PLACES_OF_TURN]).sum(axis=1), -1.0, 1.0)
-    )
-    usual = np.maximum(np.roll(turn, 2 * PLACES_OF_TURN), np.roll(turn, -2 * PLACES_OF_TURN))
-    parts, first = [], 0
-    for k in range(PLACES_OF_TURN, count - PLACES_OF_TURN):
-        if (
-            turn[k] - usual[k] > np.radians(CORNER_TURN)
-            and turn[k] == turn[k - PLACES_OF_TURN : k + PLACES_OF_TURN + 1].max()
-        ):
-            parts.append(folds[first : k + 1])
-            first = k
-    return [*parts, folds[first:]]
-
-
-def is_clear_on_rough(folds: np.ndarray, angle: float) -> bool:
-    """Whether an even line of folds (K,) FOLD is so long and sharp that it is a ridge even where many other places look folded."""
-    return len(folds) * FOLD_STRIDE >= LEAST_ROUGH_RIDGE and float(np.median(folds["bend"])) >= ROUGH_SHARE * angle
-
-
-def is_even(folds: np.ndarray, angle: float, sharpest: float = SHARPEST_FOLD_ANGLE, slack: float = 0.0) -> bool:
-    """Whether a line of folds (K,) FOLD, a stride apart, has an angle and is as even as a ridge: what bends evenly is."""
-    angles = folds["bend"]
-    if len(folds) * FOLD_STRIDE < SHORTEST_LINE_OF_FOLDS or (angles >= angle).sum() * FOLD_STRIDE < LEAST_FULL_LENGTH:
-        return False
-    ahead = np.diff(folds["place"], axis=0)
-    ahead /= np.maximum(np.linalg.norm(ahead, axis=1), 1e-300)[:, None]
-    bends = np.cross(ahead[1:], ahead[:-1])
-    uneven = float(np.median(np.linalg.norm(np.diff(bends, axis=0), axis=1))) if len(bends) > 1 else 0.0
-    gain, bend = float(np.median(folds["gain"])), np.degrees(float(np.median(angles)))
-    most = np.radians(np.interp(bend, (BLUNT_FOLD, ACUTE_FOLD), EVEN_FOLDS) + slack) + BY_NOISE / np.sqrt(
-        max(gain, 1.0)
-    )
-    return bool(gain >= SURE_GAIN and uneven <= most and bend < sharpest)
-
-
-def smoothed(places: np.ndarray) -> np.ndarray:
-    """Places (K, 3) along a fold with less of their noise; the ends stay."""
-    smooth = places.copy()
-    for reach in (1, 2):
-        if len(places) > 2 * reach:
-            weights = (reach + 1.0 - np.abs(np.arange(-reach, reach + 1))) / (reach + 1.0) ** 2
-            last = len(places) - 2 * reach
-            smooth[reach : len(places) - reach] = sum(w * places[o : o + last] for o, w in enumerate(weights))
-    return smooth

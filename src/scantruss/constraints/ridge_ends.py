@@ -34,6 +34,7 @@ class Ridge:
     sharp: bool  #: folded by the full angle; False: by less, it counts only beside others
     ring: bool = False
     acute: bool = False  #: folded by about a right angle or more
+    lip: bool = False  #: the edge of a thin body, at which the surface turns back
 
     def moved(self, places: np.ndarray) -> Ridge:
         """The same ridge in other places (K, 3)."""
@@ -153,7 +154,10 @@ def _bridged(ridges: list[Ridge], length: float) -> list[Ridge]:
         before = found[i].places if one.at == -1 else found[i].places[::-1]
         after = found[j].places if two.at == 0 else found[j].places[::-1]
         joined = Ridge(
-            np.concatenate([before, after]), found[i].sharp or found[j].sharp, acute=found[i].acute and found[j].acute
+            np.concatenate([before, after]),
+            found[i].sharp or found[j].sharp,
+            acute=found[i].acute and found[j].acute,
+            lip=found[i].lip or found[j].lip,
         )
         found = [*(ridge for k, ridge in enumerate(found) if k not in (i, j)), joined]
         ends = [*(end for k, end in enumerate(ends) if k // 2 not in (i, j)), *_ends_of(joined)]

@@ -13,7 +13,8 @@ import numpy as np
 from ..boundary.curves import length_along
 from ..boundary.polylines import divide_polyline
 from .fixed_lines import LINE_STEP
-from .fold_tracing import FOLD_STRIDE, Tracer, is_sharp, runs_along
+from .fold_tracing import HALF_NARROW_LIP, Tracer
+from .lines_of_folds import FOLD_STRIDE, is_lip, is_made, is_sharp, is_sure, runs_along
 from .network import Network, runs
 from .ridge_ends import Ridge, join_ends
 
@@ -42,31 +43,50 @@ class FoldLines:
         self._ridges: dict[tuple[int, ...], tuple[Ridge, ...]] = {}
 
     @cached_property
-    def wide(self) -> list[np.ndarray]:
-        """Those that turn over nearly a member, each (K,) FOLD."""
+    def _all_wide(self) -> list[np.ndarray]:
         return self._tracer.trace_wide(self.narrow)
+
+    @cached_property
+    def lips(self) -> list[np.ndarray]:
+        """The lips of thin bodies, each (K,) FOLD: one line stands for both of their edges."""
+        return [folds for folds in self._all_wide if is_lip(folds) and is_made(folds)]
+
+    @cached_property
+    def wide(self) -> list[np.ndarray]:
+        """Other folds that turn over nearly a member, each (K,) FOLD."""
+        return [folds for folds in self._all_wide if not (is_lip(folds) and is_made(folds))]
 
     def ridges(self, numbers: tuple[int, ...]) -> tuple[Ridge, ...]:
         """The ridges along the narrow lines and along some of the wide ones; see `find_ridges`."""
         if numbers not in self._ridges:
-            self._ridges[numbers] = self._joined([self.wide[number] for number in numbers])
+            self._ridges[numbers] = self._joined([*self.lips, *(self.wide[number] for number in numbers)])
         return self._ridges[numbers]
 
     def _joined(self, wide: list[np.ndarray]) -> tuple[Ridge, ...]:
         tracer, length = self._tracer, self.length
-        sharp = [folds for folds in self.narrow if is_sharp(folds, tracer.angle)]
-        weak = [folds for folds in self.narrow if not is_sharp(folds, tracer.angle)]
-        # pieces of a wide fold look like weak ones
-        traced = (
-            [*sharp, *(folds for folds in weak if not runs_along(folds, wide, length)), *wide] if wide else self.narrow
-        )
+        # pieces of a wide fold look like weak ones, or like ones in the noise
+        traced = [folds for folds in self.narrow if not self._is_piece_of(folds, wide)]
+        traced.sort(key=lambda folds: not is_sharp(folds, tracer.angle)) if wide else None
+        traced += wide
         lines = [
-            Ridge(folds["place"], is_sharp(folds, tracer.angle), acute=bool(np.median(folds["bend"]) >= ACUTE_RIDGE))
+            Ridge(
+                folds["place"],
+                is_sharp(folds, tracer.angle),
+                acute=bool(np.median(folds["bend"]) >= ACUTE_RIDGE),
+                lip=is_lip(folds),
+            )
             for folds in traced
         ]
-        ridges = kept_ridges(join_ends(lines, length), length)
+        ridges = whole_lips(kept_ridges(join_ends(lines, length), length), length)
         ridges = [ridge.moved(tracer.onto_scan(ridge.places)) for ridge in ridges + short_ridges(ridges, tracer)]
         return tuple(sorted(ridges, key=lambda ridge: (ridge.ring, -len(ridge.places))))
+
+    def _is_piece_of(self, folds: np.ndarray, wide: list[np.ndarray]) -> bool:
+        """Whether a narrow line (K,) FOLD runs along wide ones and says less than they do."""
+        if not runs_along(folds, wide, self.length):
+            return False
+        lips = [each for each in wide if is_lip(each)]
+        return not is_sure(folds, self._tracer.angle) or runs_along(folds, lips, 2.0 * HALF_NARROW_LIP * self.length)
 
 
 _KEPT: weakref.WeakKeyDictionary[SurfaceSamples, FoldLines] = weakref.WeakKeyDictionary()
@@ -115,6 +135,20 @@ def kept_ridges(ridges: list[Ridge], length: float) -> list[Ridge]:
         kept.append(joined[0])
         others = [ridge for ridge in others if ridge is not joined[0]]
     return kept
+
+
+def whole_lips(ridges: list[Ridge], length: float) -> list[Ridge]:
+    """Return the ridges but the lips with a free end: a sheet that is folded back on itself has one, a thin body none."""
+    return [
+        ridge
+        for ridge in ridges
+        if not ridge.lip
+        or ridge.ring
+        or all(
+            any(other.distance(end) < END_BESIDE_RIDGE * length for other in ridges if other is not ridge)
+            for end in ridge.places[[0, -1]]
+        )
+    ]
 
 
 def cut_around(ridges: list[Ridge], places: np.ndarray, length: float) -> list[Ridge]:

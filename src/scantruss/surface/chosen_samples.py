@@ -143,7 +143,7 @@ def usual_samples(
         points = some = mean_surface(some, asked.smooth_scale * length, length)
         found = link_samples(some, radius, length, spacing)
     if is_rough(found, THICKNESS_OF_SHEETS * length):
-        fine = link_finer(points, radius, length, spacing, given)
+        fine = link_finer(found, points, radius, length, spacing, given)
         if fine is not None:
             some, (found, radius) = points, fine
     rough = float((found.thickness > ROUGH_THICKNESS * length).mean())

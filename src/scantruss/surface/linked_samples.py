@@ -29,6 +29,8 @@ ROUGH_SAMPLE = 0.04  # thickness above which a sample is rough and moved to the 
 SOME_ROUGH = 0.002  # share of rough samples above which a scan may be a thick layer
 MANY_ROUGH = 0.007  # share of rough samples above which they are moved; fewer may lie along ridges
 THICKNESS_OF_SHEETS = 0.12  # thickness above which a sample may hold several sheets [member lengths]
+# share of the thick samples that finer ones may leave rough where sheets come apart: those along the edges at which they meet
+SHARE_ALONG_EDGES = 0.2
 MOST_REFINEMENTS = 2  # most times that the sample radius is halved to see whether a thick layer is several sheets
 FINEST_RADIUS = 1.0  # smallest radius of a sample [point spacings]
 SMOOTH_THICKNESS = 0.075  # largest thickness of the samples of a smooth scan [member lengths]
@@ -89,18 +91,21 @@ def is_smooth(found: Linked, length: float, uneven: float) -> bool:
 
 
 def link_finer(
-    points: np.ndarray, radius: float, length: float, spacing: float, given: GivenNormals | None = None
+    coarse: Linked, points: np.ndarray, radius: float, length: float, spacing: float, given: GivenNormals | None = None
 ) -> tuple[Linked, float] | None:
     """Return finer samples and their radius if they form smooth sheets, else None.
 
-    Sheets that lie only a few samples apart look like one rough layer; finer samples separate them.
+    Sheets that lie only a few samples apart look like one rough layer; finer samples separate them. Few of these are rough then, along
+    the edges where the sheets meet; in noise most stay so.
     """
+    thick = float((coarse.thickness > THICKNESS_OF_SHEETS * length).mean())
     for _ in range(MOST_REFINEMENTS):
         radius *= 0.5
         if radius < FINEST_RADIUS * spacing:
             return None
         found = link_samples(points, radius, length, spacing, given)
-        if not is_rough(found, ROUGH_SAMPLE * length):
+        share = float((found.thickness > ROUGH_SAMPLE * length).mean())
+        if share <= max(SOME_ROUGH, SHARE_ALONG_EDGES * thick):
             return found, radius
     return None
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...runtime.jit import kernel
 from ..boundary.curves import Curves, at_arc
-from ..geometry.vectors import cross, dot, norm, row, subtract
+from ..geometry.vectors import cross, dot, norm, row, subtract, vector_of
 from .equalize import OVER_RELAXATION, settle_node
 from .grid import (
     ON_CURVE,
@@ -37,6 +37,8 @@ SETTLING_SWEEPS = 2  # sweeps in which all nodes around a move settle
 EARLY_ALLOWANCE = (0.35, 1.2, 2.0)
 # growth of the energy by a flip, collapse or split up to which it goes on once all nodes around have settled
 LATE_ALLOWANCE = (0.06, 0.3, 0.5)
+# cosine between the normals of two patches below which the surface falls off steeply from a line
+STEEP_BESIDE_LINE = 0.5
 STRAINED_MEMBER = 0.15  # relative deviation of a member from its desired length above which its nodes ask for moves
 SHORTEST_SPLIT = 1.05  # length of the shortest member that is split [desired length]
 # length from which on a line between two nodes at rest keeps a node between them [desired length]
@@ -113,6 +115,13 @@ def tidy(net: Net, scratch: Scratch, seeds: int) -> int:
 
 
 @kernel
+def lies_beside(net: Net, patches: np.ndarray, a: int, b: int) -> bool:
+    """Whether node a is on a line from which the surface falls off so steeply to node b that its patch says nothing of the way there."""
+    steep = dot(vector_of(patches[a].normal), vector_of(patches[b].normal)) < STEEP_BESIDE_LINE
+    return steep and net.line[a] != 0 and net.line[b] == 0
+
+
+@kernel
 def make_move(net: Net, patches: np.ndarray, curves: Curves, scratch: Scratch, move: int, a: int, b: int) -> int:
     """Make a move at the edge a-b; returns the node that a split adds, -1 for other moves."""
     if move == FLIP:
@@ -124,7 +133,7 @@ def make_move(net: Net, patches: np.ndarray, curves: Curves, scratch: Scratch, m
         collapse(net, a, b)
         return -1
     added = split(net, a, b)
-    patches[added] = patches[a]
+    patches[added] = patches[b if lies_beside(net, patches, a, b) else a]
     place_between(net, curves, added, a, b)
     net.ideal[added] = 4 if net.is_open[added] == 1 else 6
     scratch.held[added] = scratch.trial[0]

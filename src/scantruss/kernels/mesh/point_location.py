@@ -6,13 +6,14 @@ import numpy as np
 
 from ...runtime.jit import kernel
 from ..boundary.curves import Curves, nearest_on_curves, slide
-from ..geometry.vectors import norm, row, subtract, vector_of
+from ..geometry.vectors import Vector, along, cross, dot, norm, row, subtract, unit, vector_of
 from ..surface.folds import PLANES_REACH, add_fold
 from ..surface.local_surface import SURFACE_PATCH, Surface, fit_patch, onto_patch, walk
 from ..surface.size_field import length_at
 from .grid import AT_REST, INTERIOR, ON_CURVE, Net
 
 FARTHEST_PATCH = 0.5  # distance of a new patch from its node above which it is of another sheet [member lengths]
+FACES_BACK = -0.3  # cosine between the normals of a node and a sample below which that is of another sheet
 SAME_CORNER = 1e-6  # distance from a corner within which a node stands on it [member lengths]
 
 
@@ -26,6 +27,30 @@ def nearest_sample(surface: Surface, x: float, y: float, z: float) -> int:
         if square < best:
             best, sample = square, s
     return sample
+
+
+@kernel
+def facing_sample(surface: Surface, place: Vector, facing: Vector, sample: int) -> int:
+    """The given sample if it faces about the same side, else the nearest that does, as on the near side of a thin wall."""
+    if dot(row(surface.normals, sample), facing) >= FACES_BACK:
+        return sample
+    best, found = np.inf, sample
+    for s in range(len(surface.mean)):
+        d = subtract(row(surface.mean, s), place)
+        square = dot(d, d)
+        if square < best and dot(row(surface.normals, s), facing) > 0.0:
+            best, found = square, s
+    return found if best < (FARTHEST_PATCH * surface.length) ** 2 else sample
+
+
+@kernel
+def facing_of_node(net: Net, v: int) -> Vector:
+    """The direction (unit vector) in which the triangles of a node face, in the mean by their areas."""
+    place, total, d = row(net.nodes, v), (0.0, 0.0, 0.0), net.degree[v]
+    for i in range(d - net.is_open[v]):
+        one, other = row(net.nodes, net.ring[v, i]), row(net.nodes, net.ring[v, (i + 1) % d])
+        total = along(total, 1.0, cross(subtract(one, place), subtract(other, place)))
+    return unit(total)
 
 
 @kernel
@@ -50,6 +75,8 @@ def locate_nodes(
             sample = walk(surface, patches[v].sample, place)
             if norm(subtract(row(surface.mean, sample), place)) > 0.5 * length:
                 sample = nearest_sample(surface, place[0], place[1], place[2])
+            if net.line[v] == 0:
+                sample = facing_sample(surface, place, facing_of_node(net, v), sample)
             patches[v].sample = sample
             for i in range(net.degree[v]):
                 u = net.ring[v, i]

@@ -24,7 +24,7 @@ from ..geometry.vectors import (
     unit,
 )
 from .local_surface import Surface, flood, walk
-from .ridges import LARGEST_GAIN
+from .ridges import FOLD, LARGEST_GAIN
 
 SIDES_FROM, SIDES_TO = 0.75, 1.6  # the sides of a wide fold are looked at so far from its line [member lengths]
 CREST_WITHIN = 0.6  # its crest is fitted to samples so near to its line [member lengths]
@@ -33,6 +33,8 @@ HALF_SLAB = 0.6  # only samples so near along the line count: beyond a corner li
 STRAIGHT_SIDES = 0.2
 EVEN_SIDES = 0.15  # share of the turn by which the normals of a side may scatter: more are waves
 NOISE_OF_NORMALS = 0.1  # they may always scatter by this [radian]
+SIDES_CANCEL = 0.7  # length of the mean normal below which the sides turn by more than a right angle
+FACES_OUT = 0.5  # least cosine of the angle between the normals of a crest and the direction in which it points
 HALF_OF_FOLD = 0.5  # the fold turns from so far on one side to so far on the other [member lengths]
 FEWEST_OF_SIDE, FEWEST_OF_CREST = 4, 4  # samples
 SEARCHES_OF_CREST = 4  # how often the line is moved to where both sides meet
@@ -61,12 +63,13 @@ SIDE = record_type(
 
 @kernel
 def axis_of_normals(surface: Surface, count: int, place: Vector, towards: Vector) -> tuple[Vector, Vector]:
-    """The direction to which normals are as perpendicular as can be, and the mean normal at right angles to it.
+    """The direction to which normals are as perpendicular as can be, and the direction at right angles to it in which a fold points.
 
-    Taken are those of the first `count` samples in the queue that lie beside the place, seen in direction `towards`.
+    That is their mean; where they turn so far that both sides nearly cancel, as at a lip, at right angles to the sides. Taken are those
+    of the first `count` samples in the queue that lie beside the place, seen in direction `towards`.
     """
     xx = xy = xz = yy = yz = zz = 0.0
-    n = (0.0, 0.0, 0.0)
+    total, n = 0, (0.0, 0.0, 0.0)
     for i in range(count):
         s = surface.queue[i]
         if abs(dot(subtract(row(surface.mean, s), place), towards)) <= HALF_SLAB * surface.length:
@@ -74,15 +77,43 @@ def axis_of_normals(surface: Surface, count: int, place: Vector, towards: Vector
             n = along(n, 1.0, m)
             xx, xy, xz = xx + m[0] * m[0], xy + m[0] * m[1], xz + m[0] * m[2]
             yy, yz, zz = yy + m[1] * m[1], yz + m[1] * m[2], zz + m[2] * m[2]
+            total += 1
     e = smallest_eigenvector(xx, xy, xz, yy, yz, zz)
     if dot(e, towards) < 0.0:
         e = (-e[0], -e[1], -e[2])
-    return e, unit(along(n, -dot(n, e), e))
+    mean = along(n, -dot(n, e), e)
+    n = unit(mean)
+    if norm(mean) >= SIDES_CANCEL * total:
+        return e, n
+    c = cross(e, n)
+    along_n, both = moment(xx, xy, xz, yy, yz, zz, n, n), moment(xx, xy, xz, yy, yz, zz, n, c)
+    turn = 0.5 * math.atan2(2.0 * both, along_n - moment(xx, xy, xz, yy, yz, zz, c, c))  # to where the sides face
+    turn += 0.5 * math.pi
+    pointing = turned_towards(n, c, turn)
+    return e, pointing if dot(pointing, mean) >= 0.0 else (-pointing[0], -pointing[1], -pointing[2])
+
+
+@kernel
+def moment(xx: float, xy: float, xz: float, yy: float, yz: float, zz: float, one: Vector, two: Vector) -> float:
+    """Product of a symmetric matrix with two vectors."""
+    return (
+        one[0] * (xx * two[0] + xy * two[1] + xz * two[2])
+        + one[1] * (xy * two[0] + yy * two[1] + yz * two[2])
+        + one[2] * (xz * two[0] + yz * two[1] + zz * two[2])
+    )
+
+
+@kernel
+def turned_towards(n: Vector, c: Vector, angle: float) -> Vector:
+    """The unit vector n, turned towards c by an angle."""
+    return along((math.cos(angle) * n[0], math.cos(angle) * n[1], math.cos(angle) * n[2]), math.sin(angle), c)
 
 
 @kernel
 def fit_wide_fold(surface: Surface, sample: int, place: Vector, towards: Vector, fold: np.record) -> bool:
     """Fit a fold to the normals of the samples around a place; False where there are too few, or its sides bend as much as it does.
+
+    The crest lies where the surface crosses the plane midway between both sides, which a lip has too, whose sides never meet.
 
     towards : direction of the ridge near by, (0, 0, 0) where it is not known
     fold : `ridges.FOLD`, filled; its gain is the square of the turn over that of its error
@@ -93,54 +124,90 @@ def fit_wide_fold(surface: Surface, sample: int, place: Vector, towards: Vector,
     e, n = axis_of_normals(surface, count, place, towards)
     if norm(towards) == 0.0:
         e, n = axis_of_normals(surface, count, place, e)
-    c = cross(e, n)
-    line = height = 0.0
+    at = place
     sums, crest, term = np.empty(2, SUMS_OF_SIDE), np.empty((TERMS_OF_CREST, TERMS_OF_CREST + 1)), np.empty(4)
     side = np.empty(2, SIDE)
     for _ in range(SEARCHES_OF_CREST):
+        c = cross(e, n)
         clear_sums(sums)
         crest[:, :] = 0.0
+        outwards = 0.0  # more than 0 where the normals of both sides point away from each other
         for i in range(count):
             s = surface.queue[i]
-            d, m = subtract(row(surface.mean, s), place), row(surface.normals, s)
-            t, u, h = dot(d, e) / size, dot(d, c) / size - line, dot(d, n) / size - height
+            outwards += dot(subtract(row(surface.mean, s), at), c) * dot(row(surface.normals, s), c)
+        for i in range(count):
+            s = surface.queue[i]
+            d, m = subtract(row(surface.mean, s), at), row(surface.normals, s)
+            t, u, h = dot(d, e) / size, dot(d, c) / size, dot(d, n) / size
             w = math.sqrt(u * u + h * h)
             if abs(t) > HALF_SLAB:
                 continue
-            if w < CREST_WITHIN:
+            if w < CREST_WITHIN and dot(m, n) > FACES_OUT:
                 term[0], term[1], term[2], term[3] = 1.0, u, u * u, t
                 for r in range(TERMS_OF_CREST):
                     for k in range(TERMS_OF_CREST):
                         crest[r, k] += term[r] * term[k]
                     crest[r, TERMS_OF_CREST] += term[r] * h
             elif SIDES_FROM < w < SIDES_TO:
-                add_sample(sums[0 if u < 0.0 else 1], w - HALF_OF_FOLD, math.atan2(dot(m, c), dot(m, n)), u, h)
+                beside = u if dot(m, n) > FACES_OUT else dot(m, c) * outwards
+                add_sample(sums[0 if beside < 0.0 else 1], w - HALF_OF_FOLD, math.atan2(dot(m, c), dot(m, n)), u, h)
         if min(sums[0].count, sums[1].count) < FEWEST_OF_SIDE or crest[0, 0] < FEWEST_OF_CREST:
             return False
         fit_side(sums[0], -1.0, side[0])
         fit_side(sums[1], 1.0, side[1])
         for r in range(TERMS_OF_CREST):
             crest[r, r] += SHARE_OF_DIAGONAL * crest[0, 0]
-        apart = math.tan(side[1].angle) - math.tan(side[0].angle)
+        # a normal at angle a from n towards c is that of the line (u - u0) sin a + (h - h0) cos a = 0
+        left, right = side[0].angle, side[1].angle
+        apart = math.sin(right) - math.sin(left)
         if apart == 0.0 or not solve_normal_equations(crest, TERMS_OF_CREST):
             return False
-        # a normal at angle a from n towards c is that of the line h = h0 - (u - u0) tan a
-        meet = side[1].height + side[1].across * math.tan(side[1].angle)
-        meet -= side[0].height + side[0].across * math.tan(side[0].angle)
-        step = max(min(meet / apart, FARTHEST_SHIFT), -FARTHEST_SHIFT)
-        height += crest[0, TERMS_OF_CREST] + step * (crest[1, TERMS_OF_CREST] + step * crest[2, TERMS_OF_CREST])
-        line += step
+        up = crest[0, TERMS_OF_CREST]
+        middle = (side[1].across * math.sin(right) + (side[1].height - up) * math.cos(right)) / apart
+        middle -= (side[0].across * math.sin(left) + (side[0].height - up) * math.cos(left)) / apart
+        step = max(min(middle, FARTHEST_SHIFT), -FARTHEST_SHIFT)
+        up += step * (crest[1, TERMS_OF_CREST] + step * crest[2, TERMS_OF_CREST])
+        at = along(along(at, step * size, c), up * size, n)
+        n = turned_towards(n, c, 0.5 * (left + right))
     turn, own = abs(side[1].angle - side[0].angle), abs(side[1].rate) + abs(side[0].rate)
     uneven = max(side[0].scatter, side[1].scatter)
     if HALF_OF_FOLD * own > STRAIGHT_SIDES * turn or uneven > max(EVEN_SIDES * turn, NOISE_OF_NORMALS):
         return False
-    put_vector(fold.place, along(along(place, line * size, c), height * size, n))
+    put_vector(fold.place, at)
     put_vector(fold.ahead, e)
     error = side[0].error + side[1].error
     bend = max(turn - HALF_OF_FOLD * own, 0.0)
     fold.bend, fold.gain = bend, min(bend * bend / max(error, 1.0 / LARGEST_GAIN), LARGEST_GAIN)
     fold.off = surface.step * math.sqrt(error)
     return True
+
+
+@kernel
+def keep_wide_folds(
+    surface: Surface, seeds: np.ndarray, apart: float, least: float, sure: float, note: np.ndarray
+) -> int:
+    """Keep, in front, the seeds (samples) at which a wide fold is fitted, of those nearer than `apart` to each other the first.
+
+    Returns their number.
+
+    least, sure : angle [radian] and gain of the fold, at least
+    note : (K,) int64 scratch, zero at the start
+    """
+    fold = np.empty(1, FOLD)
+    kept = 0
+    for i in range(len(seeds)):
+        if note[i] != 0:
+            continue
+        place = row(surface.mean, seeds[i])
+        for j in range(i + 1, len(seeds)):
+            d = subtract(row(surface.mean, seeds[j]), place)
+            if dot(d, d) < apart * apart:
+                note[j] = 1
+        fits = fit_wide_fold(surface, seeds[i], place, (0.0, 0.0, 0.0), fold[0])
+        if fits and fold[0].bend >= least and fold[0].gain >= sure:
+            seeds[kept] = seeds[i]
+            kept += 1
+    return kept
 
 
 @kernel
