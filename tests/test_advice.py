@@ -432,3 +432,17 @@ def test_a_length_nearby_that_a_fixed_position_does_not_suit_is_passed_over() ->
     assert shorter and not any(trial.passed for trial in shorter)
     with pytest.raises(st.InputError, match="away from the scan"):
         Advice(st.PointCloud.from_array(points), settings).try_length(0.9)
+
+
+def test_the_next_longer_length_is_tried_before_that_of_a_thin_wall_takes_all_grids(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As of a vase whose sharp rim has no grid at the length of its wall: none was left for the one that passes."""
+    cloud = cloud_of("limpet")
+    usual = Advice(cloud, st.Settings(length=1.0))._usual
+    wall = 0.5 * usual
+    monkeypatch.setattr(Advice, "_length_of_wall", lambda _: wall)
+    monkeypatch.setattr(Advice, "_cost", lambda _, length: 1e5 if length < 0.6 * usual else 5e4)
+    counted_runs(monkeypatch, lambda length: 1.3 * wall < length < 1.5 * wall)
+    advice = Advice(cloud, st.Settings(length=1.0))
+    assert 1.3 * wall < advice.suggest() < 1.5 * wall and advice.passes

@@ -272,9 +272,14 @@ class Advice:
                 return
 
     def _ladder(self) -> Iterator[tuple[float, int]]:
-        """Yield the lengths to try in turn, as multiples of the usual one, with how many grids are made of each."""
+        """Yield the lengths to try in turn, as multiples of the usual one, with how many grids are made of each.
+
+        That of a thin wall costs most; the next longer one, at which both sides are still apart, is looked at before it takes all of them.
+        """
         yield 1.0, A_FEW
         if (wall := self._length_of_wall()) is not None:
+            yield wall / self._usual, A_FEW
+            yield NEXT_LENGTH * wall / self._usual, FIRST_TWO
             yield wall / self._usual, SOME_MORE
         usual = self._tried_usual()
         ladder = SHORTER_FIRST if usual is not None and (usual.passed or usual.leaves_out) else LONGER_FIRST
