@@ -49,7 +49,7 @@ class FoldLines:
     @cached_property
     def lips(self) -> list[np.ndarray]:
         """The lips of thin bodies, each (K,) FOLD: one line stands for both of their edges."""
-        return [folds for folds in self._all_wide if is_lip(folds) and is_made(folds)]
+        return [folds for folds in self._all_wide if is_lip(folds) and is_made(folds) and not self._has_edges(folds)]
 
     @cached_property
     def wide(self) -> list[np.ndarray]:
@@ -80,6 +80,12 @@ class FoldLines:
         ridges = whole_lips(kept_ridges(join_ends(lines, length), length), length)
         ridges = [ridge.moved(tracer.onto_scan(ridge.places)) for ridge in ridges + short_ridges(ridges, tracer)]
         return tuple(sorted(ridges, key=lambda ridge: (ridge.ring, -len(ridge.places))))
+
+    def _has_edges(self, lip: np.ndarray) -> bool:
+        """Whether a lip (K,) FOLD is so wide that its edges are ridges of their own along most of it."""
+        angle, beside = self._tracer.angle, HALF_NARROW_LIP * self.length
+        edges = [folds for folds in self.narrow if is_sharp(folds, angle) and not runs_along(folds, [lip], beside)]
+        return runs_along(lip, edges, self.length)
 
     def _is_piece_of(self, folds: np.ndarray, wide: list[np.ndarray]) -> bool:
         """Whether a narrow line (K,) FOLD runs along wide ones and says less than they do."""
