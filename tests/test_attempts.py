@@ -9,12 +9,12 @@ from typing import Any, cast
 import numpy as np
 import pytest
 from shapes import make
-from small_clouds import cap, sheet
+from small_clouds import ball, cap, sheet
 
 import scantruss as st
 from scantruss.attempts.course import RIDGES_GIVEN_UP, WITHOUT_RODS, AttemptCourse
 from scantruss.attempts.limit import MOST_RUNS
-from scantruss.attempts.table import AS_ASKED, ROWS_TRIED, Attempt, attempts, layouts_of
+from scantruss.attempts.table import AS_ASKED, ROWS_TRIED, Attempt, attempts
 from scantruss.errors import FrontError
 
 NAMES = [row.name for row in ROWS_TRIED]
@@ -72,10 +72,25 @@ def test_an_attempt_differs_from_what_was_asked_in_what_its_row_says_and_rows_be
         for attempt in own:
             assert changed_between(base, attempt.settings) <= row.changes.keys() | row.shares.keys()
             assert all(getattr(attempt.settings, key) == value for key, value in row.changes.items())
-            assert attempt.starts in layouts_of(attempt.settings)[row.fronts]
+            assert attempt.starts in row.layouts(attempt.settings)
             assert attempt.faults == () and not attempt.is_trial
         if own and row.stays:
             base = own[0].settings
+
+
+def test_a_lattice_turned_is_tried_where_all_grids_begin_from_one() -> None:
+    points = ball(5.0, 20_000)  # of more than 600 members squared, where effort `normal` lays one lattice
+    large, small = (st.Settings(length=length) for length in (0.6, 1.2))
+    cloud = st.PointCloud.from_array(points)
+    for asked, expected in (
+        (large, [40.0]),
+        (large.replace(effort="best"), [40.0]),
+        (small, []),
+        (large.replace(effort="quick"), [40.0]),
+    ):
+        assert [a.starts[0].turn for a in attempts(cloud, asked) if a.row == "rows turned" and a.starts] == expected
+    along = large.replace(rows_along=(0.0, 0.0, 5.0, 1.0, 0.0, 0.0))
+    assert {a.row for a in attempts(cloud, along)}.isdisjoint({"rows turned", "the paper's method"})
 
 
 def driven(course: AttemptCourse, outcomes: dict[str, Any]) -> list[Attempt]:

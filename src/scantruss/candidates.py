@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from .attempts.looks import VERY_ROUGH_SCAN
 from .errors import FrontError
 from .front.advance import advance_front
-from .front.orientation_field import Field, orientation_fields
+from .front.orientation_field import Field, FieldStart, orientation_fields
 from .improve.candidate import Candidate, grid_of, judged, misses_at_most
 from .improve.optimize import improve_first, improve_last, searched_again
 from .improve.perturbation import BESIDE_RIDGES
@@ -115,11 +115,13 @@ def best_that_passes(
     settings: Settings,
     *,
     is_trial: bool = False,
+    starts: Sequence[FieldStart] | None = None,
     progress: Progress | None = None,
 ) -> Grid:
     """Improve the first candidates to the end, check them, and return the best that passes, with its certificate.
 
     is_trial : a grid that passes is left as it is, without nodes on the tips of the scan
+    starts : how their fronts were laid out, if not as usual
 
     Raises
     ------
@@ -127,7 +129,7 @@ def best_that_passes(
         None passes; the fault of the first.
     """
     if settings.effort == "best" and settings.method == "default":
-        return no_worse(candidates, samples, boundary, constraints, settings, progress=progress)
+        return no_worse(candidates, samples, boundary, constraints, settings, starts, progress=progress)
     passed = those_that_pass(candidates, samples, boundary, constraints, settings, is_trial=is_trial, progress=progress)
     return grid_of(chosen(passed))
 
@@ -187,6 +189,7 @@ def no_worse(
     boundary: Boundary,
     constraints: Constraints,
     settings: Settings,
+    starts: Sequence[FieldStart] | None = None,
     *,
     progress: Progress | None = None,
 ) -> Grid:
@@ -198,7 +201,7 @@ def no_worse(
         With effort `normal` none passes, so that this attempt is no better than a later one.
     """
     lower = settings.replace(effort="normal")
-    fields = orientation_fields(samples, boundary, lower)
+    fields = orientation_fields(samples, boundary, lower, starts)
     fronts = advance_fronts(samples, boundary, constraints, fields, lower)
     improved = improve_fronts(fronts, samples, boundary, constraints, lower)
     usual = chosen(those_that_pass(improved, samples, boundary, constraints, lower))

@@ -145,7 +145,14 @@ def make_grid(cloud: PointCloud, attempt: Attempt, *, progress: Progress | None 
     fronts = advance_fronts(samples, boundary, constraints, fields, settings, progress=progress)  # Fig. 4
     improved = improve_fronts(fronts, samples, boundary, constraints, settings, progress=progress)  # Sec. 4.1
     best = best_that_passes(
-        improved, samples, boundary, constraints, settings, is_trial=attempt.is_trial, progress=progress
+        improved,
+        samples,
+        boundary,
+        constraints,
+        settings,
+        is_trial=attempt.is_trial,
+        starts=attempt.starts,
+        progress=progress,
     )  # certificate
     return with_cells(best, samples, boundary, constraints, wanted, progress=progress)  # quads, hexagons
 

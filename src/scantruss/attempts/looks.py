@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..constraints.ridges import find_ridges
+from ..front.orientation_field import usual_starts
 from ..surface.chosen_samples import ROD
 from ..surface.samples import sample_surface
 from ..surface.sharp_edges import EDGE_SHARE, FEWEST_NEEDED
@@ -65,6 +66,14 @@ class AskedScan:
             return False
         samples = sample_surface(self.cloud, self.asked.replace(plain_body=True))
         return samples.measured < len(samples.surface.mean)
+
+    def has_one_lattice(self, settings: Settings) -> bool:
+        """Whether even effort `normal` begins from one lattice only, so that another one may fit where that does not."""
+        if settings.method != "default" or settings.rows_along:
+            return False
+        usual = settings.replace(effort="normal")
+        starts = usual_starts(sample_surface(self.cloud, usual), usual)
+        return len(starts) == 1 and starts[0].laid
 
     @cached_property
     def has_limbs_cut_off(self) -> bool:

@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 AS_ASKED = "as asked"
 # lengths of the fronts without rows, in desired lengths, tried in turn where no other passes
 FRONT_LENGTHS = (1.0, 0.97, 1.04)
+TURNED_ROWS = (40.0,)  # angles of the lattice that are tried instead of the usual one [degree]
 COARSER_SAMPLES = (1.1, 1.2, 1.3)  # distances of the surface samples that are tried instead, in those of the settings
 COARSEST_SAMPLES = 0.5  # largest of them, in desired lengths
 SMOOTHING_SCALES = (
@@ -110,11 +111,19 @@ class AttemptRow:
     """A row of the table: attempts that look at the scan in one way, each only where none before it passes."""
 
     name: str
-    fronts: slice  #: which of the layouts of `layouts_of`
+    fronts: (
+        slice | tuple[float, ...]
+    )  #: which of the layouts of `layouts_of`, or by how much their rows are turned [degree]
     when: Callable[[AskedScan, Settings], bool] = lambda scan, now: True  #: whether it is made, by the settings so far
     changes: Mapping[str, Any] = field(default_factory=dict)  #: settings, and what they become
     shares: Mapping[str, float] = field(default_factory=dict)  #: settings, and what they are multiplied by
     stays: bool = False  #: whether the rows after it keep what it changes
+
+    def layouts(self, tried: Settings) -> list[Starts]:
+        """Return how the fronts of its attempts are laid out."""
+        if isinstance(self.fronts, slice):
+            return layouts_of(tried)[self.fronts]
+        return [(FieldStart(turn),) for turn in self.fronts]
 
     def changed(self, now: Settings) -> Settings:
         """Return the settings of its attempts by the settings so far."""
@@ -150,6 +159,7 @@ ROWS_TRIED: tuple[AttemptRow, ...] = (
     AttemptRow(AS_ASKED, FIRST_LAYOUT),
     AttemptRow("hall without its columns", ALL_LAYOUTS, lambda scan, now: scan.stands_on_rods, {"keep_rods": False}),
     AttemptRow("front without rows", SECOND_LAYOUT),
+    AttemptRow("rows turned", TURNED_ROWS, lambda scan, now: scan.has_one_lattice(now)),
     # where edges, limbs or slits are in the way, other fronts seldom help
     AttemptRow("sharp edges", FIRST_LAYOUT, lambda scan, now: scan.has_sharp_edges, {"sharp_edges": True}),
     AttemptRow("plain body", FIRST_LAYOUT, lambda scan, now: scan.has_plain_body, {"plain_body": True}),
@@ -173,7 +183,7 @@ ROWS_TRIED: tuple[AttemptRow, ...] = (
         AttemptRow(f"samples {share:g} times as far apart", ALL_LAYOUTS, _samples_fit(share), shares={"box_size": share})
         for share in COARSER_SAMPLES
     ),
-    AttemptRow("the paper's method", ALL_LAYOUTS, lambda scan, now: scan.by_default, {"method": "paper"}),
+    AttemptRow("the paper's method", ALL_LAYOUTS, lambda scan, now: scan.by_default and not now.rows_along, {"method": "paper"}),
 )  # fmt: skip
 
 
@@ -189,7 +199,7 @@ def attempts(cloud: PointCloud, settings: Settings, rows: Sequence[AttemptRow] =
         if not row.when(scan, now):
             continue
         tried = row.changed(now)
-        for starts in layouts_of(tried)[row.fronts]:
+        for starts in row.layouts(tried):
             if (tried, starts) not in made:
                 made.append((tried, starts))
                 yield Attempt(tried, starts, row=row.name)
