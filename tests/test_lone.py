@@ -7,6 +7,7 @@ import pytest
 
 import scantruss as st
 from scantruss.check.distances import measure_distances
+from scantruss.check.missed import largest_patch_missed
 from scantruss.scan.clean.lone import find_lone
 from scantruss.scan.cloud import bounds_of, measure_spacing
 from scantruss.surface.samples import sample_surface
@@ -82,3 +83,14 @@ def test_cleaning_leaves_out_lone_points_where_it_looks_no_closer() -> None:
         layer_distance=None,
     )
     assert len(kept.points) == len(points)
+
+
+def test_what_is_missed_is_said_in_the_middle_of_its_largest_patch() -> None:
+    """Not where the farthest point is, which may be a stray."""
+    points = sheet(12_000, STRAYS)
+    samples = sample_surface(st.PointCloud.from_array(points), st.Settings(length=1.0))
+    distance = np.where(np.hypot(points[:, 0] - 7.0, points[:, 1] - 3.0) < 1.5, 0.8, 0.0)
+    distance[-1] = 30.0
+    place = largest_patch_missed(samples, distance, np.ones(len(points)), np.full(len(points), 0.5))
+    assert place is not None and np.hypot(place[0] - 7.0, place[1] - 3.0) < 0.3
+    assert largest_patch_missed(samples, 0.0 * distance, np.ones(len(points)), np.full(len(points), 0.5)) is None

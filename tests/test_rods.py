@@ -443,3 +443,10 @@ def test_a_strip_that_widens_evenly_is_a_foot_and_a_pole_with_a_capital_none(
     assert _widens(points, points[z > 3.9], np.zeros((0, 3))) == tapers
     level = np.column_stack([rng.uniform(-2.0, 2.0, (2000, 2)), np.full(2000, 4.2)])
     assert not _widens(points[z < 3.0] if tapers else points, points[z > 3.9], level) or tapers
+
+
+def test_no_place_that_was_closed_is_none_of_a_column() -> None:
+    """Of many openings those without a place of their own are one entry: nothing is known of where they are."""
+    samples = cast(SurfaceSamples, SimpleNamespace(scan=np.zeros((5, 3)), judged=np.full(5, ROD), origin=np.ones(3)))
+    (warning,) = openings_closed([LeftOut("hole", 1, 0.0, None, 0.8, number=6)], [], samples, LENGTH, "m")
+    assert warning.words == "closes an opening 0.8 m across (6 such places); shorter members leave it open"
