@@ -4,9 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from typed import known
 
 import scantruss as st
 from scantruss.check.distances import measure_distances
+from scantruss.check.left_out import points_left_out
 from scantruss.check.missed import largest_patch_missed
 from scantruss.scan.clean.lone import find_lone
 from scantruss.scan.cloud import bounds_of, measure_spacing
@@ -94,3 +96,15 @@ def test_what_is_missed_is_said_in_the_middle_of_its_largest_patch() -> None:
     place = largest_patch_missed(samples, distance, np.ones(len(points)), np.full(len(points), 0.5))
     assert place is not None and np.hypot(place[0] - 7.0, place[1] - 3.0) < 0.3
     assert largest_patch_missed(samples, 0.0 * distance, np.ones(len(points)), np.full(len(points), 0.5)) is None
+
+
+def test_outliers_are_said_where_most_of_them_are_together() -> None:
+    rng = np.random.default_rng(3)
+    cluster = [2.0, 7.0, 4.0] + 0.05 * rng.normal(size=(5, 3))
+    points = sheet(12_000, [*cluster.tolist(), *STRAYS])
+    samples = sample_surface(st.PointCloud.from_array(points), st.Settings(length=1.0, judge_outliers="always"))
+    away = np.abs(points[:, 2])
+    found = points_left_out(samples, away, np.ones(len(points)), np.full(len(points), 0.5))
+    part = next(part for part, _ in found if part.kind == "outliers")
+    assert part.points == samples.outliers >= 10 and part.together == 5 and known(part.size) < 0.5
+    assert np.linalg.norm(np.array(known(part.where)) - [2.0, 7.0, 4.0]) < 0.2

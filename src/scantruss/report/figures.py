@@ -217,6 +217,9 @@ def left_out_lines(certificate: Certificate) -> list[str]:
             continue
         size = f"{words_of_number(part.size or 0.0, 3)}{unit} {'long' if part.kind == 'limbs' else 'across'}"
         place = "" if part.where is None else f", near ({words_of_place(part.where)}), {size}"
+        if part.together is not None and part.where is not None and part.together < part.points:
+            some = f"{part.together:,} of them together" if part.together > 1 else "each alone, one"
+            place = f", {some} near ({words_of_place(part.where)})" + f", {size}" * (part.together > 1)
         place = f", up to {words_of_number(part.size or 0.0, 3)}{unit} across" if part.number > 1 else place
         count = f"{words_of_count(part.points, 'point')} ({part.share:.2%}) " if part.points else ""
         asked = ", as asked for" if part.asked else ""
