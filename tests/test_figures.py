@@ -1,5 +1,7 @@
 """Figures of a grid against slow twins."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from hypothesis import example, given
@@ -7,10 +9,11 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 from scantruss import Certificate, Grid
+from scantruss.check.limits import places_to_look_at
 from scantruss.errors import words_of_number
 from scantruss.grid.certificate import LeftOut, Spread, Worst
 from scantruss.kernels.geometry.components import component_labels
-from scantruss.report.figures import distance_lines
+from scantruss.report.figures import distance_lines, left_out_lines
 
 
 @pytest.mark.kernels
@@ -56,6 +59,24 @@ def test_things_joined_by_links_have_the_lowest_of_them_as_label(count: int, lin
         for thing in both:
             groups[thing] = both
     assert component_labels(count, pairs[:, 0], pairs[:, 1]).tolist() == [min(groups[thing]) for thing in range(count)]
+
+
+def test_an_outlier_is_not_the_point_farthest_from_the_grid() -> None:
+    away, kept = Spread(0.01, 8.0, 8.4, Worst(9.0, (1.0, 2.0, 3.0))), Worst(0.4, (4.0, 5.0, 6.0))
+    parts = (LeftOut("outliers", 20, 0.02, farthest=9.0),)
+    found = Certificate(
+        "m", 0.5, True, True, 1, 1, 1, 1, 1, 0, points=1000, left_out=parts, scan_distance=away, farthest_kept=kept
+    )
+    assert found.worst_places() == [("point farthest from the grid, outliers aside", kept, False)]
+    assert Certificate.from_dict(found.to_dict()) == found
+
+
+def test_one_point_is_no_points() -> None:
+    part = LeftOut("rods", 1, 0.001, (1.0, 2.0, 3.0), 0.0)
+    found = Certificate("m", 0.5, True, True, 1, 1, 1, 1, 1, 0, points=1000, left_out=(part,))
+    assert left_out_lines(found)[0].startswith("left out: 1 point (0.10%) columns")
+    far = dataclasses.replace(found, left_out=(LeftOut("far", 1, 0.001, (1.0, 2.0, 3.0), 0.0, 0.5),))
+    assert places_to_look_at(far, (0.0, 0.0, 0.0))[0].words == "misses 1 point (0.10%) by up to 0.5 m"
 
 
 @pytest.mark.parametrize(("largest", "listed"), [(8.5, True), (0.7, False)])

@@ -23,7 +23,7 @@ from scantruss.scan.member_length import length_range
 from scantruss.surface.chosen_samples import KEPT, ROD
 from scantruss.surface.linked_samples import link_samples
 from scantruss.surface.pieces import by_size
-from scantruss.surface.rods import LENGTH_STEP, lengths_of_rods, rod_points
+from scantruss.surface.rods import LENGTH_STEP, _widens, lengths_of_rods, rod_points
 from scantruss.surface.samples import SurfaceSamples, sample_surface
 from scantruss.surface.supports import free_columns, support_samples
 
@@ -406,3 +406,47 @@ def test_neither_a_chimney_nor_a_tapering_foot_is_a_column() -> None:
     for points in (chimney, foot[foot[:, 2] > 4.62]):
         found = link_samples(points, 0.15, 1.0, st.PointCloud.from_array(points).spacing)
         assert not free_columns(found.mean, 0.15, 1.0).any()
+
+
+def groin_vault_to_its_springings(noise: float) -> np.ndarray:
+    """A groin vault of a bay of 8 x 8 whose four feet come down to points, without unit; denser at its feet, as a vault is measured."""
+    rng = np.random.default_rng(8)
+    x, y = rng.uniform(-1.0, 1.0, (2, 150_000))
+    z = 4.0 * np.maximum(np.sqrt(1.0 - x * x), np.sqrt(1.0 - y * y))
+    points = np.column_stack([4.0 * x, 4.0 * y, z])[z > 0.4]
+    steep = np.minimum(np.abs(points[:, 0]), np.abs(points[:, 1])) > 3.5
+    feet = points[steep]
+    again = np.concatenate([points, feet[rng.integers(0, len(feet), 3 * len(feet))]])
+    return again + rng.normal(0.0, noise, again.shape)
+
+
+@pytest.mark.parametrize("length", [0.3, 0.45, 0.63])
+def test_the_feet_of_a_vault_are_no_columns(length: float) -> None:
+    """They stand where its supports are."""
+    cloud = st.PointCloud.from_array(groin_vault_to_its_springings(0.012))
+    samples = sample_surface(cloud, st.Settings(length=length, keep_rods=False))
+    assert not (samples.judged == ROD).any()
+    assert not free_columns(samples.surface.mean, samples.surface.radius, length).any()
+
+
+@pytest.mark.parametrize(
+    ("widths", "tapers"), [((1, 2, 3, 4), True), ((1, 1, 1, 1), False), ((1, 1, 1, 3), False), ((3, 1, 1, 1), False)]
+)
+def test_a_strip_that_widens_evenly_is_a_foot_and_a_pole_with_a_capital_none(
+    widths: tuple[int, ...], tapers: bool
+) -> None:
+    rng = np.random.default_rng(9)
+    z = rng.uniform(0.0, 4.0, 2000)
+    girth = 0.1 * (np.interp(z, [0.5, 1.5, 2.5, 3.5], widths) if tapers else np.array(widths)[z.astype(int)])
+    turn = rng.uniform(0.0, 2.0 * np.pi, len(z))
+    points = np.column_stack([girth * np.cos(turn), girth * np.sin(turn), z])
+    assert _widens(points, points[z > 3.9], np.zeros((0, 3))) == tapers
+    level = np.column_stack([rng.uniform(-2.0, 2.0, (2000, 2)), np.full(2000, 4.2)])
+    assert not _widens(points[z < 3.0] if tapers else points, points[z > 3.9], level) or tapers
+
+
+def test_no_place_that_was_closed_is_none_of_a_column() -> None:
+    """Of many openings those without a place of their own are one entry: nothing is known of where they are."""
+    samples = cast(SurfaceSamples, SimpleNamespace(scan=np.zeros((5, 3)), judged=np.full(5, ROD), origin=np.ones(3)))
+    (warning,) = openings_closed([LeftOut("hole", 1, 0.0, None, 0.8, number=6)], [], samples, LENGTH, "m")
+    assert warning.words == "closes an opening 0.8 m across (6 such places); shorter members leave it open"

@@ -19,6 +19,7 @@ from scantruss.check.certify import certify
 from scantruss.check.distances import COMPARED_WITH_NODE
 from scantruss.grid.certificate import Certificate, Spread
 from scantruss.kernels.surface.mean_surface import FEWEST_FOR_PLANE, FEWEST_FOR_QUADRIC, PLANE_FROM_ASIDE
+from scantruss.surface.chosen_samples import OUTLIER
 from scantruss.surface.samples import SurfaceSamples
 
 LENGTH = 1.0
@@ -90,7 +91,8 @@ def test_no_figure_of_the_certificate_is_left_without_a_second_opinion() -> None
     assert {spec.name for spec in fields(Certificate)} == {
         "unit", "reach", "manifold", "orientable", "pieces", "scan_pieces", "boundary_loops", "scan_loops", "euler", "handles",
         "faults", "warnings", "widened", "points", "left_out", "crossings", "scan_within_reach", "missing", "grid_within_reach",
-        "scan_distance", "triangle_distance", "node_distance", "noise", "shortest_member", "longest_member", "smallest_angle",
+        "scan_distance", "farthest_kept", "triangle_distance", "node_distance", "noise", "shortest_member", "longest_member",
+        "smallest_angle",
         "largest_angle", "sharpest_fold", "fixed_error", "irregular", "irregular_forced", "node_bias", "node_bias_p95",
         "node_scatter",
     }  # fmt: skip
@@ -111,6 +113,7 @@ def compare(
     check_spread(known(found.scan_distance), away, cloud.points + cloud.origin)
     farthest = int(away.argmax())
     assert (found.farthest_listed is not None) == bool(samples.judged[farthest] != 0 or away[farthest] > LENGTH)
+    assert known(found.farthest_kept).value == pytest.approx(away[samples.judged != OUTLIER].max(), rel=1e-9)
     beyond = (samples.judged == 0) & (away > 0.5 * LENGTH)
     assert found.missing == pytest.approx(beyond.mean(), abs=1e-12)
     assert found.scan_within_reach == (away <= 0.5 * LENGTH).mean()

@@ -83,6 +83,11 @@ def words_of_number(value: float, digits: int) -> str:
     return f"{rounded:,.0f}" if rounded.is_integer() else f"{rounded:,}"
 
 
+def words_of_count(count: int, name: str) -> str:
+    """Return how many there are of something that is called `name`, or `name` with an s where they are not one."""
+    return f"{count:,} {name}{'s' * (count != 1)}"
+
+
 def decimal_comma_words(text: str) -> str:
     """Return what to write in place of a number with a decimal comma, to follow what is needed; nothing for any other text."""
     text = text.strip()

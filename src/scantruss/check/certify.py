@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import CertificateError
 from ..grid.certificate import Certificate, Fault, Spread, Worst, place_of
 from ..runtime.parallel import side_by_side
-from ..surface.chosen_samples import KEPT, LIMB, SLIT
+from ..surface.chosen_samples import KEPT, OUTLIER
 from .bare import mostly_bare
 from .boundaries import places_aside, stops_short
 from .crossings import find_crossings
@@ -26,7 +26,8 @@ from .gaps import bridged_gaps, openings_closed
 from .hanging import hanging_nodes, nodes_off_sheets
 from .irregular import count_irregular
 from .left_out import asked_for, closed_holes, first_and_more, parts_left_out, without_caps
-from .limits import NOISES_OFF, ROUNDED_BY, limits_of, mostly_rounded, places_to_look_at, widened_limits
+from .limits import NOISES_OFF, limits_of, mostly_rounded, places_to_look_at, widened_limits
+from .missed import farthest_followed, largest_patch_missed, points_missed, share_rounded
 from .openings import boundary_faults
 from .sheets import cut_apart, faults_on_sheets, nodes_of_samples
 from .slits import feet_on, narrow_gaps
@@ -99,7 +100,7 @@ class Judged:
         grid, samples, boundary, settings = self.grid, self.samples, self.boundary, self.settings
         members = _desired_at_points(grid, found, length)
         followed = _to_follow(samples)
-        missed_at = place_of(samples.scan[_missed(found, followed, members)] + samples.origin)
+        missed_at = place_of(samples.scan[farthest_followed(found.scan, followed, members)] + samples.origin)
         rough = samples.moved  # then its roughness is the scatter
         feet = feet_on(grid, samples, found, length)
         offsets, (gaps, bridged), doubtful, aside, beyond, beside, apart, bare, peaks = side_by_side(
@@ -114,7 +115,7 @@ class Judged:
             lambda: [] if rough else rounded_peaks(grid, samples, found, followed, members),
         )
         roughness = NOISES_OFF * offsets.get("node_scatter", 0.0) if rough else 0.0
-        rounded = _rounded(found, followed, members, roughness)
+        rounded = share_rounded(found.scan, followed, members, COVER_REACH * members, roughness)
         places = places_to_look_at(self.certificate, missed_at, rounded)
         closed = asked_for(closed_holes(samples, boundary), settings.fill_at, length)
         gaps = asked_for(without_caps(gaps, samples), settings.fill_at, length)
@@ -166,7 +167,12 @@ def judge(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings: Set
         lambda: replace(_topology(grid, samples, boundary, settings), **_extremes(grid, settings)),
     )
     certificate = replace(certificate, crossings=len(cuts), **_apart(grid, samples, found, length))
-    faults = [*faults_of_topology(grid, certificate, boundary), *faults_in_space(grid, certificate, cuts, settings)]
+    members = _desired_at_points(grid, found, length)
+    patch = largest_patch_missed(samples, found.scan, members, COVER_REACH * members)
+    faults = [
+        *faults_of_topology(grid, certificate, boundary),
+        *faults_in_space(grid, certificate, cuts, settings, patch),
+    ]
     too_far, poor = limits_of(grid, found, settings)
     known = {fault.kind for fault in faults}
     further = (
@@ -262,8 +268,7 @@ def _apart(grid: Grid, samples: SurfaceSamples, found: Distances, length: float)
     members = at_triangles[found.triangle]
     known = found.triangles[np.isfinite(found.triangles)]
     in_reach = known <= COVER_REACH * at_triangles[np.isfinite(found.triangles)]
-    wanted = np.isin(samples.judged, (KEPT, LIMB, SLIT)) & ~samples.elsewhere
-    beyond = wanted & (found.scan > COVER_REACH * members)
+    beyond = points_missed(samples, found.scan, COVER_REACH * members)
     left_out = parts_left_out(samples, found, members, COVER_REACH * members)
     return {
         "points": len(samples.scan),
@@ -272,6 +277,9 @@ def _apart(grid: Grid, samples: SurfaceSamples, found: Distances, length: float)
         "scan_within_reach": float((found.scan <= COVER_REACH * members).mean()),
         "grid_within_reach": float(in_reach.mean()) if len(known) else 1.0,
         "scan_distance": _spread(found.scan, samples.scan, grid, length / members),
+        "farthest_kept": _worst(
+            np.where(samples.judged == OUTLIER, np.nan, found.scan), samples.scan, grid, length / members
+        ),
         "triangle_distance": _spread(
             found.triangles, grid.nodes[grid.triangles].mean(axis=1), grid, length / at_triangles
         ),
@@ -337,20 +345,6 @@ def _at_boundary(
     """Return warnings of where the boundary of a grid is not that of its scan; parameters as of `stops_short`."""
     aside = places_aside(grid, boundary, length, samples)
     return aside + stops_short(grid, samples, found, followed, members, aside)
-
-
-def _missed(found: Distances, followed: np.ndarray, members: np.ndarray) -> int:
-    """Return which point is the farthest from the grid of those that it follows (N,) bool, and that lie within a member (N,) of it."""
-    return int(np.where(followed & (found.scan <= members), found.scan / members, -1.0).argmax())
-
-
-def _rounded(found: Distances, followed: np.ndarray, members: np.ndarray, roughness: float) -> float:
-    """Return the share of the points that a grid rounds off: of those that it follows (N,) bool, by desired member lengths (N,).
-
-    roughness : distance from the grid up to which points are scatter about the mean surface [scan unit]
-    """
-    off = (found.scan > ROUNDED_BY * members + roughness) & (found.scan <= COVER_REACH * members)
-    return float((followed & off).mean())
 
 
 def _spread(values: np.ndarray, places: np.ndarray, grid: Grid, weight: np.ndarray) -> Spread | None:

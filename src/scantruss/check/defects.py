@@ -79,8 +79,13 @@ def _length_at(grid: Grid, where: Place, settings: Settings) -> float:
     return float(grid.desired[away.argmin()])
 
 
-def faults_in_space(grid: Grid, found: Certificate, crossings: np.ndarray, settings: Settings) -> list[Fault]:
-    """Return what is wrong with where the nodes are; `crossings` (P, 2) are triangles that cut each other."""
+def faults_in_space(
+    grid: Grid, found: Certificate, crossings: np.ndarray, settings: Settings, patch: Place | None = None
+) -> list[Fault]:
+    """Return what is wrong with where the nodes are; `crossings` (P, 2) are triangles that cut each other.
+
+    patch : the middle of the largest patch of the scan that is missed
+    """
     faults = []
     if len(crossings):
         pairs = "a pair" if len(crossings) == 1 else f"{len(crossings)} pairs"
@@ -98,7 +103,7 @@ def faults_in_space(grid: Grid, found: Certificate, crossings: np.ndarray, setti
         limbs = sum(part.share for part in found.left_out if part.kind == "limbs")
         thin = f", {limbs:.1%} on limbs too thin for the members" if limbs else ""
         words = f"leaves out {found.missing:.1%} of the scan{thin}"
-        faults.append(Fault("cover", words, found.scan_distance.largest.where))
+        faults.append(Fault("cover", words, patch or found.scan_distance.largest.where))
     gone = OFF_SURFACE + settings.bridged_boundary_length / (2 * math.pi * settings.length)
     worst = found.triangle_distance.largest if found.triangle_distance else None
     if worst and worst.value > gone * _length_at(grid, worst.where, settings):

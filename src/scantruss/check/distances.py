@@ -31,7 +31,7 @@ COMPARED_WITH_NODE = 30  # points a node that are compared with it
 POINTS_OF_PLANE = 12  # points through which the plane at a node goes
 PLACES_MEASURED_PER_THREAD = 20_000  # fewest points for a thread of their own
 
-_KEPT_BOXES: weakref.WeakKeyDictionary[SurfaceSamples, dict[tuple[bool, float], SearchBoxes]] = (
+_KEPT_BOXES: weakref.WeakKeyDictionary[SurfaceSamples, dict[tuple[bool, int, float], SearchBoxes]] = (
     weakref.WeakKeyDictionary()
 )
 
@@ -93,7 +93,7 @@ def distances_to_points(
     grid: Grid, samples: SurfaceSamples, length: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the distances of the triangles and of the nodes from the scan, and its noise there; see `Distances`."""
-    points = samples.measured_points
+    points = samples.points_of_surface
     boxes = kept_boxes_of(points, max(POINT_BOX * length, 2.0 * samples.spacing), samples)
     a, b, c = (grid.nodes[grid.triangles[:, k]] for k in range(3))
     middles = (a + b + c) / 3.0
@@ -127,7 +127,7 @@ def distances_to_planes(
 
 def points_of_planes(samples: SurfaceSamples) -> np.ndarray:
     """Return the points (N, 3) from which nodes are measured: those that were read, or of the mean surface where nodes lie on that."""
-    return samples.surface.points if samples.moved else samples.measured_points
+    return samples.surface.points if samples.moved else samples.points_of_surface
 
 
 def offsets_from_points(grid: Grid, samples: SurfaceSamples, length: float) -> tuple[np.ndarray, np.ndarray]:
@@ -179,7 +179,7 @@ def normals_at_nodes(grid: Grid) -> np.ndarray:
 
 def kept_boxes_of(points: np.ndarray, box: float, samples: SurfaceSamples) -> SearchBoxes:
     """Return the measured points of a scan, or those of its mean surface, by box; they are kept for as long as its samples exist."""
-    kept, asked = _KEPT_BOXES.setdefault(samples, {}), (points is samples.surface.points, box)
+    kept, asked = _KEPT_BOXES.setdefault(samples, {}), (points is samples.surface.points, len(points), box)
     if asked not in kept:
         kept[asked] = boxes_of(points, box)
     return kept[asked]

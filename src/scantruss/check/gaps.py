@@ -142,7 +142,8 @@ def openings_closed(
         (
             words
             for judged, words in left_out
-            if all(_has_points_within(samples.scan[samples.judged == judged], *place) for place in relative)
+            if relative
+            and all(_has_points_within(samples.scan[samples.judged == judged], *place) for place in relative)
         ),
         "",
     )

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from .distances import Distances
 
 LIMBS_APART = 0.5  # gap between points of two limbs [member lengths]
+SCATTERED_APART = 8.0  # gap between scattered points up to which they are beside each other [spacings of the points]
+MOST_STEPS_APART = 1e5  # cells along an axis by which these are found, at most
 AROUND_HOLE = 0.25  # distance from a hole at which a place names it [member lengths]
 CAP_REACH = 1.2  # distance from the middle of a ring within which a place lies on its cap [largest radii of the ring]
 PLACES_LISTED = 5  # places of a kind that are listed one by one; the others are one entry without a place
@@ -64,7 +66,8 @@ def points_left_out(
     parts = []
     for kind, judged in (("outliers", OUTLIER), ("sparse", SPARSE_POINT), ("rods", ROD), ("duplicates", DUPLICATE)):
         if len(which := np.flatnonzero(samples.judged == judged)):
-            parts.append(_part(kind, which, samples, distance))
+            scattered = judged in (OUTLIER, SPARSE_POINT)
+            parts.append((_scattered if scattered else _part)(kind, which, samples, distance))
     away = np.flatnonzero((samples.judged == KEPT) & ((distance > reach) | samples.elsewhere))
     owner = owners_of(samples, samples.scan[away])
     small = (owner >= 0) & ~samples.kept[owner]
@@ -110,6 +113,19 @@ def _part(
     size = float(np.ptp(points, axis=0).max()) if placed else None
     share, farthest = len(which) / len(samples.scan), float(distance[which].max())
     return LeftOut(kind, len(which), share, where, size, farthest), which
+
+
+def _scattered(
+    kind: str, which: np.ndarray, samples: SurfaceSamples, distance: np.ndarray
+) -> tuple[LeftOut, np.ndarray]:
+    """Return points that may be all over the scan (K,), K > 0, as one entry, with the place and the size of the most beside each other."""
+    points = samples.scan[which]
+    apart = max(SCATTERED_APART * samples.spacing, float(np.ptp(points, axis=0).max()) / MOST_STEPS_APART)
+    group = points_together(points, np.full(len(which), apart)) if apart > 0.0 else np.zeros(len(which), np.int64)
+    own = group == np.bincount(group).argmax()
+    largest, _ = _part(kind, which[own], samples, distance)
+    whole, _ = _part(kind, which, samples, distance)
+    return replace(whole, where=largest.where, size=largest.size, together=int(own.sum())), which
 
 
 def _places(

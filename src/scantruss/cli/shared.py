@@ -128,7 +128,9 @@ def note_outliers(
     if samples.repeated:
         bars.note(f"{samples.repeated:,} duplicate points are left out; {say}--no-drop-duplicates keeps them")
     if samples.outliers:
-        bars.note(f"{samples.outliers:,} outliers are left out; {say}--outlier-distance 0 keeps them")
+        one = samples.outliers == 1
+        say_outliers = "1 outlier is left out" if one else f"{samples.outliers:,} outliers are left out"
+        bars.note(f"{say_outliers}; {say}--outlier-distance 0 keeps {'it' if one else 'them'}")
     pieces, share = samples.left_out
     if pieces and listed is None:
         bars.note(

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..check.folds import fold_angles
-from ..errors import words_of_number
+from ..errors import words_of_count, words_of_number
 from ..grid.alike import JOINTS, PANELS
 from ..grid.certificate import Certificate
 from ..grid.grid import Grid
@@ -204,7 +204,7 @@ def pins_of(certificate: Certificate) -> list[Pin]:
         for name, worst, of_angle in certificate.worst_places()
     ]
     return pins + [
-        Pin(f"left out: {part.words}", f"{part.points:,} points" if part.points else "", part.where)
+        Pin(f"left out: {part.words}", words_of_count(part.points, "point") if part.points else "", part.where)
         for part in certificate.left_out
         if part.where is not None and part.kind != "far"
     ]

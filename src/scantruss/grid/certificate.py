@@ -59,6 +59,9 @@ class LeftOut:
     farthest: float | None = None  #: largest distance from the grid [scan unit]
     asked: bool = False  #: a setting asked for it; else it was ScanTruss's own judgement
     number: int = 1  #: holes or gaps, where it is several
+    together: int | None = (
+        None  #: of scattered points, how many the most beside each other are; then `where` and `size` are theirs
+    )
 
     @property
     def words(self) -> str:
@@ -111,6 +114,7 @@ class Certificate:
         0.0  #: share of the triangles, middle and corners, within `reach` of a point, closed holes aside
     )
     scan_distance: Spread | None = None  #: of every point that was read from the nearest triangle
+    farthest_kept: Worst | None = None  #: of the points that were read, outliers aside, the farthest from the grid
     triangle_distance: Spread | None = (
         None  #: of each triangle, middle and corners, from the nearest point, closed holes aside
     )
@@ -164,14 +168,18 @@ class Certificate:
             ("sharpest fold between triangles, 180 is level", self.sharpest_fold, True),
             ("node farthest from the scan", _largest(self.node_distance), False),
             ("triangle farthest from the scan", _largest(self.triangle_distance), False),
-            (
-                f"point farthest from the grid{', one left out' * bool(self.farthest_listed)}",
-                _largest(self.scan_distance),
-                False,
-            ),
+            self._farthest_point,
             ("fixed node farthest from its position", self.fixed_error, False),
         )
         return [(name, worst, of_angle) for name, worst, of_angle in found if worst is not None]
+
+    @property
+    def _farthest_point(self) -> tuple[str, Worst | None, bool]:
+        """As a row of `worst_places`: an outlier that is listed as left out says nothing of the grid."""
+        listed, name = self.farthest_listed, "point farthest from the grid"
+        if listed is not None and listed.kind == "outliers" and self.farthest_kept is not None:
+            return f"{name}, outliers aside", self.farthest_kept, False
+        return f"{name}{', one left out' * (listed is not None)}", _largest(self.scan_distance), False
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values, ready for JSON; `passed` first."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from .. import __version__
 from ..check.limits import WARN_LEFT_OUT
-from ..errors import words_of_number, words_of_place
+from ..errors import words_of_count, words_of_number, words_of_place
 from ..grid.certificate import near
 from ..grid.line_sets import FIXED_LINE, RIDGE, sets_of
 from ..kernels.geometry.components import component_labels
@@ -116,7 +116,8 @@ def grid_lines(grid: Grid, points: int) -> list[str]:
     lines += line_lines(grid)
     bridging = 0 if grid.deviation is None else len(grid.nodes) - len(grid.measured_deviation)
     if bridging:
-        lines.append(f"{bridging} nodes lie over closed holes, where the scan has no points")
+        lie = "lies" if bridging == 1 else "lie"
+        lines.append(f"{words_of_count(bridging, 'node')} {lie} over closed holes, where the scan has no points")
     if grid.certificate is not None:
         lines += distance_lines(grid.certificate)
         lines += left_out_lines(grid.certificate)
@@ -216,8 +217,11 @@ def left_out_lines(certificate: Certificate) -> list[str]:
             continue
         size = f"{words_of_number(part.size or 0.0, 3)}{unit} {'long' if part.kind == 'limbs' else 'across'}"
         place = "" if part.where is None else f", near ({words_of_place(part.where)}), {size}"
+        if part.together is not None and part.where is not None and part.together < part.points:
+            some = f"{part.together:,} of them together" if part.together > 1 else "each alone, one"
+            place = f", {some} near ({words_of_place(part.where)})" + f", {size}" * (part.together > 1)
         place = f", up to {words_of_number(part.size or 0.0, 3)}{unit} across" if part.number > 1 else place
-        count = f"{part.points:,} points ({part.share:.2%}) " if part.points else ""
+        count = f"{words_of_count(part.points, 'point')} ({part.share:.2%}) " if part.points else ""
         asked = ", as asked for" if part.asked else ""
         lines.append(f"left out: {count}{part.words}{place}{asked}" if count else f"{part.words}{place}")
     return lines

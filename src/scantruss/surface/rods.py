@@ -32,6 +32,13 @@ JUNCTIONS_LOOKED_AT = 8  # places of a group of rods at which it may go on as a 
 FLAT_ACROSS = 0.1  # largest variance across a strip, in that over its width; half a tube has 0.19
 PLACES_OF_STRIP = 16  # places of a strip at which it is looked at, at most
 FILLED_ACROSS = 0.3  # least variance across the points around a place of a strip, in that along it; of half a disc 0.28
+PARTS_OF_FOOT = 4  # parts of its length at which it is looked at how wide a foot is
+# width of a foot at its sheet, in that at its tip, at least; its last step from part to part, in all that it widens, at most
+WIDER_AT_SHEET, EVENLY_WIDER = 1.6, 0.8
+BESIDE_STRIP = (
+    1.5  # distance from the axis within which the sheet may take part in a foot [distance of its farthest point]
+)
+AS_WIDE = 1.25  # by how much the part before the last may be wider [width of the last]
 LEVEL_WITH_SHEET = 0.87  # cosine of the angle between the normals of a strip and of the sheet that it continues
 # share of the samples of a rod that lie along a line on their own, not as ends of others, at least, where most are single points:
 # scaffolds and columns 0.5 to 1, a sparse sheet less than 0.1
@@ -76,6 +83,7 @@ def rod_points(found: Linked, points: int, length: float, supports: np.ndarray |
         rod |= ends
     rod &= _long_groups(found, rod, known, length) & ~_of_sparse_sheets(found, rod, along_line, length)
     rod &= ~_arms(found, rod, length)
+    rod &= ~_feet(found, rod)
     rod |= _behind_sheets(found, rod, length)
     if rod.mean() > MOST_RODS:
         rod[:] = False
@@ -141,6 +149,76 @@ def _arms(found: Linked, rod: np.ndarray, length: float) -> np.ndarray:
         level = [_is_level(points, found.mean[one], COARSE_REACH * length, normals[one]) for one in at]
         arm[own] = 2 * sum(level) > len(level)
     return arm
+
+
+def _feet(found: Linked, rod: np.ndarray) -> np.ndarray:
+    """Return which samples (S,) bool are of feet of a sheet, where it comes down to a tip: straight, and the wider the nearer to it.
+
+    A column or a pole is of one girth from end to end, but for its base and its capital.
+    """
+    foot = np.zeros(len(rod), np.bool_)
+    if not rod.any():
+        return foot
+    label, beside = _groups_of(found, rod), found.neighbors
+    begins = rod & ((beside >= 0) & ~rod[beside]).any(axis=1)
+    for group in np.unique(label[begins]):
+        own = rod & (label == group)
+        points = _points_of(found, own)
+        reach = 0.5 * np.ptp(points, axis=0).max()
+        ends = found.mean[own & begins]
+        near = ~rod & (((found.mean - ends.mean(axis=0)) ** 2).sum(axis=1) < reach**2)
+        foot |= own & _widens(points, ends, _points_of(found, near))
+    return foot
+
+
+def _points_of(found: Linked, which: np.ndarray) -> np.ndarray:
+    """Return the points (N, 3) of some samples (S,) bool."""
+    return found.grouped[np.repeat(which, np.diff(found.start))]
+
+
+def _widens(points: np.ndarray, ends: np.ndarray, beyond: np.ndarray) -> bool:
+    """Whether points (N, 3) form a straight strip that widens evenly up to the end where it meets a sheet, or beyond it.
+
+    ends : (K, 3) places where it meets the sheet, some of them perhaps stray
+    beyond : (M, 3) points of the sheet around them
+    """
+    middle = points.mean(axis=0)
+    if len(points) < PARTS_OF_FOOT * SAMPLES_OF_SHEET:
+        return False
+    variances, axes = np.linalg.eigh(np.cov(points - middle, rowvar=False))
+    if not _thin(variances[None])[0]:
+        return False
+    all_points = np.concatenate([points, beyond]) - middle
+    across = all_points @ axes[:, :2]
+    away = np.linalg.norm(across, axis=1)
+    aside = away > BESIDE_STRIP * away[: len(points)].max()
+    for along in (axes[:, 2], -axes[:, 2]):
+        at = all_points @ along
+        low, high = at[: len(points)].min(), at[: len(points)].max()
+        part = np.floor(PARTS_OF_FOOT * (at - low) / (high - low)).astype(np.int64)
+        part[: len(points)] = np.minimum(part[: len(points)], PARTS_OF_FOOT - 1)
+        part[aside & (part < PARTS_OF_FOOT)] = -1
+        width = [_width_of(across[part == each]) for each in range(PARTS_OF_FOOT + 1)]
+        tapers = _is_even_taper(*width[:PARTS_OF_FOOT]) or _is_even_taper(*width[1:])
+        if tapers and ((ends - middle) @ along).max() > 0.0:
+            return True
+    return False
+
+
+def _width_of(across: np.ndarray) -> float:
+    """Return the standard deviation of places (K, 2) along their wider axis; NaN of few."""
+    few = len(across) < SAMPLES_OF_SHEET
+    return math.nan if few else math.sqrt(np.linalg.eigvalsh(np.cov(across, rowvar=False))[1])
+
+
+def _is_even_taper(first: float, second: float, third: float, last: float) -> bool:
+    """Whether the widths of four parts beside each other grow, and not at one step as at a capital; not if one is unknown.
+
+    The last may be hardly as wide as the one before, as the sheet begins there.
+    """
+    narrow = 0.5 * (first + second)
+    grows = max(first, second) < third < AS_WIDE * last and last >= WIDER_AT_SHEET * narrow
+    return grows and last - third <= EVENLY_WIDER * (last - narrow)
 
 
 def _is_level(points: np.ndarray, place: np.ndarray, reach: float, normal: np.ndarray) -> bool:

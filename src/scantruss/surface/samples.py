@@ -13,7 +13,6 @@ from ..kernels.scan.nearby import nearest_places
 from ..kernels.surface.local_surface import Surface
 from ..runtime.parallel import in_parts
 from ..scan.clean.duplicates import find_repeated, has_repeats
-from ..scan.clean.outliers import some_stand_alone
 from ..scan.clean.streamline import points_near
 from ..scan.cloud import Bounds, PointCloud, bounds_of
 from ..scan.normals import mean_normals
@@ -37,6 +36,7 @@ from .floor import find_floor
 from .given_normals import GivenNormals, given_normals
 from .limbs import LimbRing, cut_limbs
 from .linked_samples import LINKED_POINTS_PER_THREAD, PATCH_SPACING, Linked, group, link_samples
+from .of_cloud import cloud_has_outliers, lone_of_cloud
 from .owners import owners_of
 from .pieces import by_size, chosen_pieces, large_pieces, number_pieces, places_to_count, sample_areas
 from .rods import lengths_of_rods, pieces_of_rods, rod_points
@@ -45,6 +45,7 @@ from .size_field import length_field
 from .supports import free_columns, support_samples
 
 BESIDE_SAMPLES = 1.5  # distance from points of the boundary within which all points are used [`sample_spacing`]
+UNCLEANED_DISTANCE = 3.0  # as `Settings.outlier_distance`, where a scan is not cleaned
 BROAD_PASSES = 4  # times that normals are averaged with those beside them for the sheet as a whole
 WITHOUT_COORDINATES = "with NaN or infinite coordinates"  # why points are not read
 POINTS_OF_KEPT_SAMPLES = (
@@ -87,6 +88,8 @@ class SurfaceSamples:
     rings: tuple[LimbRing, ...] = ()  #: where limbs too thin for a grid were cut off
     #: (2, 3) the box around the points that were not read since a crop left them out, by its words, in the scan's own frame
     cropped: tuple[tuple[str, np.ndarray], ...] = ()
+    #: (N,) points with nothing else near them, whether they are left out or not; none where that is not known
+    lone: np.ndarray = field(default_factory=lambda: np.zeros(0, np.bool_))
 
     def __repr__(self) -> str:
         """Say how many samples and pieces there are."""
@@ -108,6 +111,12 @@ class SurfaceSamples:
         """The points that were read and kept, without outliers and duplicates (M, 3) [scan unit]."""
         kept = self.judged == KEPT
         return self.scan if kept.all() else np.ascontiguousarray(self.scan[kept])
+
+    @cached_property
+    def points_of_surface(self) -> np.ndarray:
+        """The measured points (M, 3) without lone ones, which may have been kept but are no surface [scan unit]."""
+        alone = (self.judged == KEPT) & self.lone if len(self.lone) else np.zeros(1, np.bool_)
+        return self.scan[(self.judged == KEPT) & ~self.lone] if alone.any() else self.measured_points
 
     @cached_property
     def kept(self) -> np.ndarray:
@@ -156,7 +165,6 @@ class SurfaceSamples:
 
 
 _SAMPLES_OF_CLOUDS: weakref.WeakKeyDictionary[PointCloud, dict[Asked, SurfaceSamples]] = weakref.WeakKeyDictionary()
-_OUTLIERS_OF_CLOUDS: weakref.WeakKeyDictionary[PointCloud, bool] = weakref.WeakKeyDictionary()
 
 
 def sample_surface(cloud: PointCloud, settings: Settings) -> SurfaceSamples:
@@ -171,26 +179,26 @@ def sample_surface(cloud: PointCloud, settings: Settings) -> SurfaceSamples:
     """
     asked = Asked.of(settings, cloud.origin, cloud.z_is_up)
     if asked.outlier_distance and not asked.judge_always:
-        asked = asked._replace(judge_always=_has_outliers(cloud))
+        asked = asked._replace(judge_always=cloud_has_outliers(cloud))
     kept = _SAMPLES_OF_CLOUDS.setdefault(cloud, {})
     if asked not in kept:
         most = max(1, POINTS_OF_KEPT_SAMPLES // max(len(cloud.points), 1))
         for oldest in list(kept)[: max(0, len(kept) + 1 - most)]:
             del kept[oldest]
-        made = _prepare(cloud.points, cloud.bounds, cloud.spacing, asked, given_normals(cloud))
+        lone = lone_of_cloud(cloud, asked.outlier_distance or UNCLEANED_DISTANCE)
+        made = _prepare(cloud.points, cloud.bounds, cloud.spacing, asked, given_normals(cloud), lone=lone)
         check_is_surface(made)
         unread = (*cloud.left_out, *((WITHOUT_COORDINATES, cloud.dropped) for _ in range(cloud.dropped > 0)))
         kept[asked] = replace(
-            made, origin=cloud.origin, unit=cloud.unit, system=cloud.system, unread=unread, cropped=cloud.cropped
+            made,
+            origin=cloud.origin,
+            unit=cloud.unit,
+            system=cloud.system,
+            unread=unread,
+            cropped=cloud.cropped,
+            lone=lone,
         )
     return kept[asked]
-
-
-def _has_outliers(cloud: PointCloud) -> bool:
-    """Whether outliers are looked for at every length, since `clean` finds some in the cloud; kept as long as the cloud lives."""
-    if cloud not in _OUTLIERS_OF_CLOUDS:
-        _OUTLIERS_OF_CLOUDS[cloud] = some_stand_alone(cloud.points, cloud.spacing)
-    return _OUTLIERS_OF_CLOUDS[cloud]
 
 
 def is_graded(surface: Surface) -> bool:
@@ -220,6 +228,7 @@ def samples_with(
         judged=samples.judged,
         unread=samples.unread,
         cropped=samples.cropped,
+        lone=samples.lone,
         whole=samples.whole,
         sample_spacing=samples.sample_spacing,
         rough=samples.rough,
@@ -283,11 +292,18 @@ def _prepare(
     asked: Asked,
     given: GivenNormals | None,
     measured: int | None = None,
+    lone: np.ndarray | None = None,
 ) -> SurfaceSamples:
-    """Return the samples of points; those after the first `measured` were added to fill holes, and none is left out then."""
+    """Return the samples of points; those after the first `measured` were added to fill holes, and none is left out then.
+
+    lone : (N,) bool, points that are left out if outliers are
+    """
     length, scan, judged = asked.length, points, np.zeros(len(points), np.uint8)
     if asked.drop_duplicates and has_repeats(points):
         judged[find_repeated(points)] = DUPLICATE
+    if asked.outlier_distance and lone is not None:
+        judged[lone] = OUTLIER
+    if judged.any():
         points = np.ascontiguousarray(points[judged == KEPT])
         bounds = bounds_of(points)
     thinned = measured is None

@@ -21,6 +21,8 @@ MOST_SUPPORTED = 0.2  # share of the samples from which on they are no supports 
 SLAB_RADII = 3.0  # height and width of the cells in which columns without a floor are looked for, least [sample radii]
 # by how much a column's middle moves from slab to slab, and its width over its height, at most [member lengths], [widths]
 UPRIGHT_WITHIN, EVEN_WITHIN = 0.2, 0.3
+# by how much a part of a foot is wider at its top than at its bottom, at least, where one below is narrower and at its end [its width]
+WIDENS, WIDENS_FROM_END = 0.05, 0.15
 WIDEST_COLUMN = 1.6  # widest column without a floor in plan [member lengths]; a grid has five members or less around it
 MOST_IN_COLUMNS = 0.4  # share of the samples from which on they are no columns but the shell
 # least variance in plan across a column, in that along it: a strip of a shell has less, half a tube 0.19
@@ -81,8 +83,11 @@ def free_columns(mean: np.ndarray, radius: float, length: float) -> np.ndarray:
             if 0.0 < width <= WIDEST_COLUMN * length:
                 pieces.append(own)
                 shape.append((slab[own[0]], *(0.5 * (low + high)), width))
-    for chain in _chains(np.array(shape).reshape(-1, 4), length):
-        own, width = np.concatenate([pieces[each] for each in chain]), np.array(shape)[chain, 3]
+    shapes = np.array(shape).reshape(-1, 4)
+    for chain in _chains(shapes, length):
+        own, width = np.concatenate([pieces[each] for each in chain]), shapes[chain, 3]
+        if _is_part_of_foot(chain, shapes, length):
+            continue
         if np.ptp(width) <= EVEN_WITHIN * width.max() and _is_column(mean, own, float(width.max()), length):
             column[own] = column.max() + 1
     is_shell = (under & (column == 0)).mean() <= MOST_UNDER and (column > 0).mean() <= MOST_IN_COLUMNS
@@ -100,6 +105,36 @@ def _chains(shape: np.ndarray, length: float) -> list[np.ndarray]:
     one, other = np.array(pairs, np.int64).reshape(-1, 2).T
     label = component_labels(len(shape), one, other) if len(shape) else one
     return [np.flatnonzero(label == each) for each in np.unique(label)]
+
+
+def _is_part_of_foot(chain: np.ndarray, shape: np.ndarray, length: float) -> bool:
+    """Whether parts of slabs (K,) on each other are of a foot of the shell: what is above them widens over a stretch as long as theirs.
+
+    Or they widen as what is above them does. What is below is narrower, if anything is.
+
+    shape : (N, 4) slab, middle in plan and width of all parts
+    """
+    level, width = shape[chain, 0], shape[chain, 3]
+    bottom, top = shape[chain[level.argmin()]], shape[chain[level.argmax()]]
+    below, above = _beside(shape, bottom, -1.0, length), _beside(shape, top, 1.0, length)
+    if not len(above) or (above[:, 3] <= width.max()).any() or (below[:, 3] >= width.min()).any():
+        return False
+    if top[3] >= (1.0 + (WIDENS if len(below) else WIDENS_FROM_END)) * bottom[3]:
+        return True
+    slabs, here = 0, top
+    for _ in range(int(np.ptp(level)) + 1):
+        above = _beside(shape, here, 1.0, length)
+        if not len(above) or above[:, 3].min() < (1.0 + WIDENS) * here[3]:
+            break
+        slabs, here = slabs + 1, above[above[:, 3].argmin()]
+    return slabs > np.ptp(level)
+
+
+def _beside(shape: np.ndarray, part: np.ndarray, step: float, length: float) -> np.ndarray:
+    """Return which of the parts (N, 4) of slabs stand on a part (4,) of one, step 1, or under it, -1; rows as `_chains`."""
+    away = np.hypot(*(shape[:, 1:3] - part[1:3]).T)
+    near = away <= UPRIGHT_WITHIN * length + 0.5 * np.abs(shape[:, 3] - part[3])  # a foot may widen to one side
+    return shape[(shape[:, 0] == part[0] + step) & near]
 
 
 def _is_column(mean: np.ndarray, own: np.ndarray, width: float, length: float) -> bool:

@@ -11,6 +11,7 @@ from ...boundary.find import find_boundary
 from ...check.certify import COVER_REACH
 from ...check.distances import distances_to_grid
 from ...check.left_out import points_left_out
+from ...errors import words_of_count
 from ...grid.certificate import KINDS_LEFT_OUT
 from ...surface.samples import sample_surface
 from .strokes import placed
@@ -81,7 +82,7 @@ def shown_points(grid: Grid, cloud: PointCloud) -> Shown:
         which = np.concatenate(groups)
         left[which] = True
         if kind in COLOUR_OF_PART:
-            words = f"{len(which):,} points: {KINDS_LEFT_OUT[kind]}"
+            words = f"{words_of_count(len(which), 'point')}: {KINDS_LEFT_OUT[kind]}"
             missed.append(Missed(words, points[which], COLOUR_OF_PART[kind], kind not in ("outliers", "sparse"), kind))
-    unread = tuple(f"{count:,} points: {words}, not shown" for words, count in samples.unread)
+    unread = tuple(f"{words_of_count(count, 'point')}: {words}, not shown" for words, count in samples.unread)
     return Shown(points[~left], tuple(missed), unread)

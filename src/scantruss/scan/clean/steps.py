@@ -9,8 +9,9 @@ import numpy as np
 from ...errors import InputError, unit_words
 from ...runtime.progress import Progress
 from ...settings import JUDGE_OUTLIERS
-from ..cloud import PointCloud, measure_spacing
+from ..cloud import PointCloud, bounds_of, measure_spacing
 from .duplicates import find_near_duplicates, find_repeated
+from .lone import find_lone
 from .nearby import REACH_TO, Nearby
 from .noise import find_layers, fit_surfaces, onto_surfaces
 from .normals import orient_to_one_side
@@ -165,8 +166,14 @@ class _Work:
 
     def leave_out_outliers(self, distance: float, when: str) -> None:
         """Leave out what lies off every surface."""
-        if when == "always" or some_stand_alone(self.points, measure_spacing(self.points)):
-            self.leave_out("outliers", find_outliers(self.points, distance), "outliers left out")
+        spacing = measure_spacing(self.points)
+        outlier = find_lone(self.points, bounds_of(self.points), spacing, distance)
+        if when == "always" or some_stand_alone(self.points, spacing):
+            rest = np.flatnonzero(~outlier)
+            outlier[rest] = find_outliers(np.ascontiguousarray(self.points[rest]), distance)
+            self.leave_out("outliers", outlier, "outliers left out")
+        elif outlier.any():
+            self.leave_out("outliers", outlier, "outliers left out, which have nothing near them")
         else:
             self.add("outliers", 0, "outliers left out: no point stands alone; --judge-outliers always looks closer")
 

@@ -1,0 +1,55 @@
+"""Which points of its scan a grid misses or rounds off, and where most of them are."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..grid.certificate import place_of
+from ..surface.chosen_samples import KEPT, LIMB, SLIT
+from .left_out import LIMBS_APART, points_together
+from .limits import ROUNDED_BY
+
+if TYPE_CHECKING:
+    from ..surface.samples import SurfaceSamples
+
+
+def points_missed(samples: SurfaceSamples, distance: np.ndarray, reach: np.ndarray) -> np.ndarray:
+    """Return which points (N,) bool a grid is to follow and misses; parameters as of `points_left_out`."""
+    wanted = np.isin(samples.judged, (KEPT, LIMB, SLIT)) & ~samples.elsewhere
+    missed: np.ndarray = wanted & (distance > reach)
+    return missed
+
+
+def largest_patch_missed(
+    samples: SurfaceSamples, distance: np.ndarray, members: np.ndarray, reach: np.ndarray
+) -> tuple[float, float, float] | None:
+    """Return the point in the middle of the most points beside each other that a grid misses; None if it misses none.
+
+    Parameters as of `points_left_out`.
+    """
+    which = np.flatnonzero(points_missed(samples, distance, reach))
+    if not len(which):
+        return None
+    group = points_together(samples.scan[which], LIMBS_APART * members[which])
+    patch = samples.scan[which[group == np.bincount(group).argmax()]]
+    middle = patch[((patch - patch.mean(axis=0)) ** 2).sum(axis=1).argmin()]
+    return place_of(middle + samples.origin)
+
+
+def farthest_followed(distance: np.ndarray, followed: np.ndarray, members: np.ndarray) -> int:
+    """Return which point is the farthest from the grid of those that it follows (N,) bool, and that lie within a member (N,) of it."""
+    return int(np.where(followed & (distance <= members), distance / members, -1.0).argmax())
+
+
+def share_rounded(
+    distance: np.ndarray, followed: np.ndarray, members: np.ndarray, reach: np.ndarray, roughness: float
+) -> float:
+    """Return the share of the points that a grid rounds off: of those that it follows (N,) bool, by desired member lengths (N,).
+
+    distance, reach : (N,) of each point from the grid, and that from which on it is missed [scan unit]
+    roughness : distance from the grid up to which points are scatter about the mean surface [scan unit]
+    """
+    off = (distance > ROUNDED_BY * members + roughness) & (distance <= reach)
+    return float((followed & off).mean())
