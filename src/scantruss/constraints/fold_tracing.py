@@ -15,7 +15,7 @@ from ..kernels.surface.ridges import FOLD
 from ..kernels.surface.wide_folds import fit_wide_fold
 from ..runtime.jit import new_record
 from ..runtime.watch import Watch
-from ..surface.near_scan import distance_from_scan
+from ..surface.near_scan import distance_from_scan, noise_of_points
 
 if TYPE_CHECKING:
     from ..settings import Settings
@@ -28,7 +28,8 @@ FIRST_NEAR_CORNERS = 2  # number of the first of the radii for places near corne
 POINTS_OF_A_FIT = 300.0  # points to which a fold is fitted, some more or less
 MOST_POINTS_OF_FIT = 6000  # points that there is room for
 FEWEST_OF_A_SAMPLE = 3.0  # of each sample at least
-FOLD_FITS_WITHIN = 0.02  # distance of the points from a fold up to which no smaller radius is tried [member lengths]
+# distance of the points from a fold up to which no smaller radius is tried, at least [member lengths], and in those that are noise
+FOLD_FITS_WITHIN, NOISES_OF_FIT = 0.02, 1.5
 FOLD_AHEAD, WIDE_FOLD_AHEAD = 0.6, 1.0  # farthest that the next crest lies from where it was expected [steps]
 FOLD_STRIDE = 0.25  # step from place to place along a fold [member lengths]
 LEAST_TURN_SHARE = 0.25  # share of the ridge angle by which neighbouring normals must differ where a fold is looked for
@@ -43,15 +44,16 @@ FADED_FOLD = 0.2  # a fold ends where its angle has fallen to this share of the 
 FOLD_OVER_SMOOTH = 10.0  # how much better a fold must fit than a smooth surface (F statistic)
 ROUGHEST_SIDE = 0.12  # points farther from a fold than this follow neither side [member lengths]
 LOOK_SPACING = 0.33  # places closer together than this are not looked at twice [member lengths]
-FOLD_BESIDE, WIDE_FOLD_BESIDE = (
-    0.5,
-    0.8,
-)  # farthest that the crest lies from the place at which a fold was found [member lengths]
+# farthest that the crest lies from the place at which a fold was found [member lengths]
+FOLD_BESIDE, WIDE_FOLD_BESIDE = 0.5, 0.8
 MOST_SAMPLES = 4000  # most samples from which folds are looked for, the sharpest first
 FALSE_FOLDS_OF_ROUGH = 12  # places in a row that look folded and are no ridge, after which only long ridges count
 MOST_FALSE_FOLDS = 80  # such places in a row after which the search stops
 LEAST_ROUGH_RIDGE = 6.0  # least length of a line of folds on a rough scan [member lengths]
 ROUGH_SHARE = 1.4  # share of the ridge angle by which half of such a line is folded at least
+LEAST_LINE_AT_CREST = (
+    1.5  # least length of a line that is found from its crest only: crests of lobes are shorter [member lengths]
+)
 MISSED_PLACES = 2  # places in a row at which a fold may not be seen and still goes on
 LEAST_TURN_COSINE = 0.94  # least cosine of the turn of a fold from place to place
 PLACES_OF_SHORTEST_RING = 6  # places along the shortest ring
@@ -79,7 +81,8 @@ class Tracer:
         of_sample = samples.area / len(samples.surface.mean)
         self.most = [POINTS_OF_A_FIT * of_sample / (np.pi * radius**2) for radius in self.radii]
         self.spacing = samples.spacing
-        self.fits = max(FOLD_FITS_WITHIN * settings.length, 1.5 * float(np.median(samples.thickness)))
+        noise = max(noise_of_points(samples), float(np.median(samples.thickness)))
+        self.fits = max(FOLD_FITS_WITHIN * settings.length, NOISES_OF_FIT * noise)
         self.buffer = np.empty(MOST_POINTS_OF_FIT, FIT_POINT)
         self.origin = samples.origin
         self.wide = False
@@ -95,11 +98,8 @@ class Tracer:
         fold, best = new_record(FOLD), None
         x, y, z = place.tolist()
         a, b, c = towards.tolist()
-        if (
-            self.wide
-            and fit_wide_fold(self.surface, sample, (x, y, z), (a, b, c), fold)
-            and fold.gain >= FOLD_OVER_SMOOTH
-        ):
+        fits_wide = self.wide and fit_wide_fold(self.surface, sample, (x, y, z), (a, b, c), fold)
+        if fits_wide and fold.gain >= FOLD_OVER_SMOOTH:
             return fold
         for number, (radius, most) in enumerate(zip(self.radii, self.most, strict=True)):
             if number < first or (number >= FIRST_NEAR_CORNERS and best is not None and self._is_clear(best)):
@@ -159,17 +159,32 @@ class Tracer:
                 and np.linalg.norm(fold.place - places[k])
                 < (WIDE_FOLD_BESIDE if self.wide else FOLD_BESIDE) * self.length
             ):
-                folds = self._follow(sample, fold, [ridge["place"] for ridge in ridges])
-                self.watch.note(len(folds), folds["place"][-1] + self.origin)
-                slack = WIDE_UNEVEN if self.wide else 0.0
-                parts = parts_of_fold(folds)
-                even = [part for part in parts if is_even(part, WEAK_FOLD * self.angle, self.sharpest, slack)]
-                even = [part for part in even if not rough or is_clear_on_rough(part, self.angle)]
+                known_places = [ridge["place"] for ridge in ridges]
+                folds, even = self._even_parts(sample, fold, known_places, rough)
+                if not even and (settled := self._settled(sample, fold)) is not None:
+                    folds, even = self._even_parts(sample, settled, known_places, rough)
+                    even = [part for part in even if len(part) * FOLD_STRIDE >= LEAST_LINE_AT_CREST]
                 ridges += even
                 misses = 0 if even else misses
                 for place in folds["place"]:
                     fresh &= ((places - place) ** 2).sum(axis=1) > (2.4 * LOOK_SPACING * self.length) ** 2
         return ridges
+
+    def _even_parts(
+        self, sample: int, fold: np.record, others: list[np.ndarray], rough: bool
+    ) -> tuple[np.ndarray, list[np.ndarray]]:
+        """The line of folds (K,) FOLD through a first one, and its parts that are even, on a rough scan those that are clear."""
+        folds, slack = self._follow(sample, fold, others), WIDE_UNEVEN if self.wide else 0.0
+        self.watch.note(len(folds), folds["place"][-1] + self.origin)
+        even = [each for each in parts_of_fold(folds) if is_even(each, WEAK_FOLD * self.angle, self.sharpest, slack)]
+        return folds, [part for part in even if not rough or is_clear_on_rough(part, self.angle)]
+
+    def _settled(self, sample: int, fold: np.record) -> np.record | None:
+        """The fold around the crest of one that was found beside it, where both sides are seen alike; None where it is another fold."""
+        again = self.fold_at(sample, fold.place, fold.ahead)
+        if again is None or abs(again.ahead @ fold.ahead) <= LEAST_TURN_COSINE:
+            return None
+        return again if again.bend > WEAK_FOLD * self.angle else None
 
     def is_folded_between(self, first: np.ndarray, last: np.ndarray) -> bool:
         """Whether the scan is folded all along the straight way from one place to another."""
