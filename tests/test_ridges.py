@@ -14,6 +14,7 @@ from steps import steps_of
 from typed import known
 
 from scantruss import Grid, PointCloud, Settings, grid_from_points
+from scantruss.boundary.curves import length_along
 from scantruss.boundary.find import find_boundary
 from scantruss.check.certify import Judged, judge
 from scantruss.constraints.find import find_constraints, wanted_ridges
@@ -32,6 +33,7 @@ from scantruss.kernels.surface.ridges import (
 )
 from scantruss.kernels.surface.turned_folds import smooth_part, turned_fold_error
 from scantruss.runtime.jit import new_record
+from scantruss.surface.near_scan import noise_of_points
 from scantruss.surface.samples import sample_surface
 
 SIZE = 5.0  # member length of all shapes here
@@ -81,6 +83,28 @@ def test_the_ridge_of_a_gable_is_a_straight_chain_from_rim_to_rim() -> None:
 
 
 @compiled_only
+def folded_plate(noise: float, to_member: int, seed: int) -> np.ndarray:
+    """A plate of 24 by 16 with five folds across, of 84 degrees, and so many points on the square of a member of 1."""
+    rng = np.random.default_rng(seed)
+    xy = rng.uniform(0.0, (24.0, 16.0), (to_member * 24 * 16, 2))
+    places = np.column_stack([xy, np.abs(xy[:, 0] / 8.0 % 1.0 - 0.5) * 7.2])
+    return places + noise * rng.normal(size=places.shape)
+
+
+@pytest.mark.parametrize(("noise", "to_member"), [(0.02, 60), (0.035, 60), (0.035, 150), (0.045, 300)])
+def test_noise_of_points_cuts_no_ridge_short(noise: float, to_member: int) -> None:
+    """Of folds that all fit but for noise, that of the smallest radius, which fits fewest points, was taken for the best."""
+    found = ridges_of(folded_plate(noise, to_member, 0), 1.0)
+    assert len(found) == 5
+    assert all(length_along(ridge.places) > 12.0 for ridge in found)
+
+
+def test_noise_is_that_of_points_and_not_of_their_means() -> None:
+    settings = Settings(length=1.0)
+    samples = sample_surface(PointCloud.from_array(folded_plate(0.03, 150, 1)), settings)
+    assert noise_of_points(samples) == pytest.approx(0.03, rel=0.1)
+
+
 def test_the_ridges_of_a_groin_vault_cross_in_its_middle() -> None:
     grid = grid_from_points(groin(), Settings(length=SIZE))
     nodes = line_nodes(grid)
@@ -409,3 +433,17 @@ def test_a_ridge_that_curls_up_to_a_tip_ends_in_its_corner() -> None:
     tips = np.array([[x, y, 17.0] for x in (-20.0, 20.0) for y in (-20.0, 20.0)]) - cloud.origin
     away = np.linalg.norm(boundary.loops[0].corners[:, None] - tips, axis=2).min(axis=0)
     assert away.max() < 0.1 * settings.length
+
+
+def test_a_ridge_is_found_from_its_crest_where_it_was_first_seen_beside_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """From a fold that is seen a little beside the crest the next one lies too far aside to go on."""
+    points, fold_at = folded_plate(0.01, 100, 0), Tracer.fold_at
+
+    def aside(self: Tracer, sample: int, place: np.ndarray, towards: np.ndarray, first: int = 0) -> Any:
+        fold = fold_at(self, sample, place, towards, first)
+        if fold is not None and not towards.any():
+            fold.place += 0.2 * np.cross(self.surface.normals[sample], fold.ahead)
+        return fold
+
+    monkeypatch.setattr(Tracer, "fold_at", aside)
+    assert len(ridges_of(points, 1.0)) == 5

@@ -23,6 +23,7 @@ from .distances import Distances, measure_distances, offsets_from_points
 from .doubtful import doubtful_places
 from .folds import fold_angles
 from .gaps import bridged_gaps, openings_closed
+from .handles import false_struts
 from .hanging import hanging_nodes, nodes_off_sheets
 from .irregular import count_irregular
 from .left_out import asked_for, closed_holes, first_and_more, parts_left_out, without_caps
@@ -110,7 +111,7 @@ class Judged:
             lambda: _at_boundary(grid, samples, boundary, found, followed, members, length),
             lambda: boundary_faults(grid, samples, boundary, length),
             lambda: [] if rough else _beside(grid, samples, found, followed, members),
-            lambda: cut_apart(grid, samples, found, length),
+            lambda: cut_apart(grid, samples, found, length) + false_struts(grid, samples, self.certificate, length),
             lambda: mostly_bare(grid, samples, feet, length),
             lambda: [] if rough else rounded_peaks(grid, samples, found, followed, members),
         )

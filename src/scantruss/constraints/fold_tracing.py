@@ -15,7 +15,7 @@ from ..kernels.surface.ridges import FOLD
 from ..kernels.surface.wide_folds import fit_wide_fold, keep_wide_folds
 from ..runtime.jit import new_record
 from ..runtime.watch import Watch
-from ..surface.near_scan import distance_from_scan
+from ..surface.near_scan import distance_from_scan, noise_of_points
 from .lines_of_folds import (
     FOLD_STRIDE,
     GAIN_OF_SURE,
@@ -43,7 +43,8 @@ FIRST_NEAR_CORNERS = 2  # number of the first of the radii for places near corne
 POINTS_OF_A_FIT = 300.0  # points to which a fold is fitted, some more or less
 MOST_POINTS_OF_FIT = 6000  # points that there is room for
 FEWEST_OF_A_SAMPLE = 3.0  # of each sample at least
-FOLD_FITS_WITHIN = 0.02  # distance of the points from a fold up to which no smaller radius is tried [member lengths]
+# distance of the points from a fold up to which no smaller radius is tried, at least [member lengths], and in those that are noise
+FOLD_FITS_WITHIN, NOISES_OF_FIT = 0.02, 1.5
 FOLD_AHEAD, WIDE_FOLD_AHEAD = 0.6, 1.0  # farthest that the next crest lies from where it was expected [steps]
 LEAST_TURN_SHARE = 0.25  # share of the ridge angle by which neighbouring normals must differ where a fold is looked for
 LIKELY_FOLD = 0.35  # share of the ridge angle above which a fold is looked at more closely
@@ -53,14 +54,14 @@ FADED_FOLD = 0.2  # a fold ends where its angle has fallen to this share of the 
 FOLD_OVER_SMOOTH = 10.0  # how much better a fold must fit than a smooth surface (F statistic)
 ROUGHEST_SIDE = 0.12  # points farther from a fold than this follow neither side [member lengths]
 LOOK_SPACING = 0.33  # places closer together than this are not looked at twice [member lengths]
-FOLD_BESIDE, WIDE_FOLD_BESIDE = (
-    0.5,
-    0.8,
-)  # farthest that the crest lies from the place at which a fold was found [member lengths]
-WIDE_LOOK_SPACING = 0.5  # the same for wide folds [member lengths]
+# farthest that the crest lies from the place at which a fold was found [member lengths]
+FOLD_BESIDE, WIDE_FOLD_BESIDE = 0.5, 0.8
+WIDE_LOOK_SPACING = 0.5  # distance between places at which wide folds are looked for [member lengths]
 MOST_SAMPLES = 4000  # most samples from which folds are looked for, the sharpest first
 FALSE_FOLDS_OF_ROUGH = 12  # places in a row that look folded and are no ridge, after which only long ridges count
 MOST_FALSE_FOLDS = 80  # such places in a row after which the search stops
+# least length of a line that is found from its crest only: crests of lobes are shorter [member lengths]
+LEAST_LINE_AT_CREST = 1.5
 # places in a row at which a fold may not be seen and still goes on: beside a corner, a wide one is not for the width of its sides
 MISSED_PLACES, WIDE_MISSED_PLACES = 2, 4
 LEAST_TURN_COSINE = 0.94  # least cosine of the turn of a fold from place to place
@@ -91,7 +92,8 @@ class Tracer:
         of_sample = samples.area / len(samples.surface.mean)
         self.most = [POINTS_OF_A_FIT * of_sample / (np.pi * radius**2) for radius in self.radii]
         self.spacing = samples.spacing
-        self.fits = max(FOLD_FITS_WITHIN * settings.length, 1.5 * float(np.median(samples.thickness)))
+        noise = max(noise_of_points(samples), float(np.median(samples.thickness)))
+        self.fits = max(FOLD_FITS_WITHIN * settings.length, NOISES_OF_FIT * noise)
         self.buffer = np.empty(MOST_POINTS_OF_FIT, FIT_POINT)
         self.origin = samples.origin
         self.wide = False
@@ -174,18 +176,33 @@ class Tracer:
                 and np.linalg.norm(fold.place - places[k])
                 < (WIDE_FOLD_BESIDE if self.wide else FOLD_BESIDE) * self.length
             ):
-                folds = self._follow(sample, fold, [ridge["place"] for ridge in ridges])
-                self.watch.note(len(folds), folds["place"][-1] + self.origin)
-                slack = WIDE_UNEVEN if self.wide else 0.0
-                parts = parts_of_fold(folds)
-                sharpest = SHARPEST_LIP if self.wide else self.sharpest
-                even = [part for part in parts if is_even(part, WEAK_FOLD * self.angle, sharpest, slack)]
-                even = [part for part in even if not rough or is_clear_on_rough(part, self.angle)]
+                known_places = [ridge["place"] for ridge in ridges]
+                folds, even = self._even_parts(sample, fold, known_places, rough)
+                if not even and (settled := self._settled(sample, fold)) is not None:
+                    folds, even = self._even_parts(sample, settled, known_places, rough)
+                    even = [part for part in even if len(part) * FOLD_STRIDE >= LEAST_LINE_AT_CREST]
                 ridges += even
                 misses = 0 if even else misses
                 for place in folds["place"]:
                     fresh &= ((places - place) ** 2).sum(axis=1) > (2.4 * LOOK_SPACING * self.length) ** 2
         return ridges
+
+    def _even_parts(
+        self, sample: int, fold: np.record, others: list[np.ndarray], rough: bool
+    ) -> tuple[np.ndarray, list[np.ndarray]]:
+        """The line of folds (K,) FOLD through a first one, and its parts that are even, on a rough scan those that are clear."""
+        folds, slack = self._follow(sample, fold, others), WIDE_UNEVEN if self.wide else 0.0
+        self.watch.note(len(folds), folds["place"][-1] + self.origin)
+        sharpest = SHARPEST_LIP if self.wide else self.sharpest
+        even = [each for each in parts_of_fold(folds) if is_even(each, WEAK_FOLD * self.angle, sharpest, slack)]
+        return folds, [part for part in even if not rough or is_clear_on_rough(part, self.angle)]
+
+    def _settled(self, sample: int, fold: np.record) -> np.record | None:
+        """The fold around the crest of one that was found beside it, where both sides are seen alike; None where it is another fold."""
+        again = self.fold_at(sample, fold.place, fold.ahead)
+        if again is None or abs(again.ahead @ fold.ahead) <= LEAST_TURN_COSINE:
+            return None
+        return again if again.bend > WEAK_FOLD * self.angle else None
 
     def is_folded_between(self, first: np.ndarray, last: np.ndarray) -> bool:
         """Whether the scan is folded all along the straight way from one place to another."""

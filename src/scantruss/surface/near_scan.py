@@ -1,4 +1,4 @@
-"""Places beside the scan: how far off they are, which length is desired there, and what is said of those that a user names."""
+"""Beside the surface of a scan: how far places and points are off it, which length is desired there, and what is said of places."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
 #: ratios of units, and theirs of feet and inches: places in one of them are read as in another
 OTHER_UNITS = (10.0, 100.0, 1000.0, 0.1, 0.01, 0.001, 0.3048, 1 / 0.3048, 25.4, 1 / 25.4, 12.0, 1 / 12.0)
+SAMPLES_OF_NOISE, POINTS_OF_NOISE = 1000, 100  # samples from which the noise is taken, and points of each, at most
 FAR_SCAN = 2.0  # distance of a scan from zero at which its box tells units apart [its size]
 
 
@@ -32,6 +33,26 @@ def distance_from_scan(surface: Surface, place: np.ndarray) -> float:
         points = surface.points[surface.start[sample] : surface.start[sample + 1]]
         best = min(best, float(((points - place) ** 2).sum(axis=1).min()))
     return float(np.sqrt(best))
+
+
+def noise_of_points(samples: SurfaceSamples) -> float:
+    """Return how far points lie off their surface: by the heights of a point and of that beside it [scan unit].
+
+    The samples are means of several points each and lie nearer to it; and points that are nearest to each other lie on one level
+    where the surface bends within a sample.
+    """
+    surface = samples.surface
+    several = np.flatnonzero(np.diff(surface.start) > 1)
+    squares = []
+    for sample in several[:: len(several) // SAMPLES_OF_NOISE + 1].tolist():
+        own = surface.points[surface.start[sample] : surface.start[sample + 1]]
+        own = own[:: len(own) // POINTS_OF_NOISE + 1]
+        heights = own @ surface.normals[sample]
+        level = own - heights[:, None] * surface.normals[sample]
+        apart = ((level[:, None] - level) ** 2).sum(axis=2)
+        np.fill_diagonal(apart, np.inf)
+        squares.append(0.5 * np.mean((heights - heights[apart.argmin(axis=1)]) ** 2))
+    return float(np.sqrt(np.median(squares))) if squares else 0.0
 
 
 def check_on_scan(

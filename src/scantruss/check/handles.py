@@ -1,0 +1,177 @@
+"""Struts of a grid between sheets that its scan does not join: handles around which the scan faces along them, not outwards."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..errors import words_of_number
+from ..grid.certificate import Fault, place_of
+from .limits import PLACES_KEPT
+
+if TYPE_CHECKING:
+    from ..grid.certificate import Certificate
+    from ..grid.grid import Grid
+    from ..surface.samples import SurfaceSamples
+
+LONGEST_RING = 12  # members around a handle, up to which it is looked at
+BESIDE_RING = 0.5  # samples that lie so near to the members of a ring are of the scan around it [member lengths]
+# what a ring around a strut between two sheets has at least: how far they face each other, and the cosine of its axis and the way
+# from one to the other; around limbs and handles of the scan the first is negative, -0.7 to -1
+FACE_EACH_OTHER, ALONG_WAY = 0.4, 0.7
+STRUTS_APART = 2.0  # rings whose middles are nearer to each other are around one strut [member lengths]
+
+
+def false_struts(grid: Grid, samples: SurfaceSamples, found: Certificate, length: float) -> list[Fault]:
+    """Return a warning of the handles of a grid that join two sheets of its scan which the scan does not join there.
+
+    Around a limb or a handle of the scan its normals point away from the limb. Around a strut between two sheets that only lie near
+    each other, as two legs do, they point along it, those of each sheet towards the other.
+
+    Parameters
+    ----------
+    found : of the grid, with how many handles it has
+    length : desired member length [scan unit]
+    """
+    if not found.handles:
+        return []
+    struts: list[np.ndarray] = []
+    for ring in rings_around_handles(grid):
+        middle = grid.nodes[ring].mean(axis=0)
+        known = any(
+            np.isin(ring, other).any()
+            or np.linalg.norm(middle - grid.nodes[other].mean(axis=0)) < STRUTS_APART * length
+            for other in struts
+        )
+        if not known and len(struts) < found.handles:
+            facing, cosine = sheets_beside(grid.nodes[ring], samples, length)
+            if facing > FACE_EACH_OTHER and cosine > ALONG_WAY:
+                struts.append(ring)
+    if not struts:
+        return []
+    around = float(np.linalg.norm(grid.nodes[struts[0]] - grid.nodes[np.roll(struts[0], 1)], axis=1).sum())
+    unit, more = f" {grid.unit}" if grid.unit else "", f" ({len(struts)} such places)" if len(struts) > 1 else ""
+    words = f"joins parts of the scan that face each other by a strut {words_of_number(around, 3)}{unit} around{more}"
+    at, *also = (place_of(grid.nodes[ring].mean(axis=0) + grid.origin) for ring in struts[:PLACES_KEPT])
+    return [Fault("strut", words, at, tuple(also))]
+
+
+def sheets_beside(ring: np.ndarray, samples: SurfaceSamples, length: float) -> tuple[float, float]:
+    """Return how far the scan around a ring (K, 3) is two sheets that face each other, and the ring around the way between them.
+
+    Of the direction in which most of its normals lie: how far what lies on either side of the ring in it faces the ring, the less
+    of both, from -1 to 1; and the cosine between it and the axis of the ring.
+    """
+    middle = ring.mean(axis=0)
+    off = ring - middle
+    axis = np.cross(off, np.roll(off, -1, axis=0)).sum(axis=0)
+    places = np.concatenate([ring, 0.5 * (ring + np.roll(ring, -1, axis=0))])
+    away = samples.surface.mean - middle
+    near = np.flatnonzero((away**2).sum(axis=1) < (np.linalg.norm(off, axis=1).max() + length) ** 2)
+    gaps = ((samples.surface.mean[near, None] - places) ** 2).sum(axis=2).min(axis=1, initial=np.inf)
+    near = near[gaps < (BESIDE_RING * length) ** 2]
+    if not len(near):
+        return 0.0, 0.0
+    normals = samples.surface.normals[near]
+    directions = np.linalg.eigh(normals.T @ normals)[1]
+    across = directions[:, -1]
+    heights, facing = away[near] @ across, normals @ across
+    sides = [facing[heights < 0.0], -facing[heights > 0.0]]
+    least = min(float(side.sum() / max(np.abs(side).sum(), 1e-300)) for side in sides)
+    cosine = abs(float(axis @ across)) / max(float(np.linalg.norm(axis)), 1e-300)
+    return least, cosine
+
+
+def rings_around_handles(grid: Grid) -> list[np.ndarray]:
+    """Return rings of at most `LONGEST_RING` members that no part of the grid lies within, the shortest first, each its nodes (K,).
+
+    From each node the shortest is found by going outwards: two ways to the ends of a member that cross other cuts close such a ring.
+    """
+    cuts = cuts_of_members(grid)
+    if not any(cuts):
+        return []
+    beside: list[list[tuple[int, int]]] = [[] for _ in grid.nodes]
+    for (one, other), cut in zip(grid.edges.tolist(), cuts, strict=True):
+        beside[one].append((other, cut))
+        beside[other].append((one, cut))
+    found: dict[frozenset[int], list[int]] = {}
+    for root in range(len(grid.nodes)):
+        ring = _shortest_ring(root, beside)
+        if ring:
+            found.setdefault(frozenset(ring), ring)
+    return [np.array(ring) for ring in sorted(found.values(), key=lambda ring: (len(ring), ring))]
+
+
+def _shortest_ring(root: int, beside: list[list[tuple[int, int]]]) -> list[int]:
+    """Return the nodes of the shortest ring through a node that crosses the cuts an odd number of times; none if it is too long."""
+    before, crossed, layer = {root: -1}, {root: 0}, [root]
+    for _ in range(LONGEST_RING // 2):
+        after: list[int] = []
+        for node in layer:
+            for other, cut in beside[node]:
+                through = crossed[node] ^ cut
+                if other not in crossed:
+                    before[other], crossed[other] = node, through
+                    after.append(other)
+                elif crossed[other] != through:
+                    one, two = _way(node, before), _way(other, before)
+                    return one[::-1] + two[:-1] if len(set(one) & set(two)) == 1 else []
+        layer = after
+    return []
+
+
+def _way(node: int, before: dict[int, int]) -> list[int]:
+    """Return the nodes from one back to the root."""
+    way = [node]
+    while before[way[-1]] >= 0:  # ends at the root: each node was reached after the one before it
+        way.append(before[way[-1]])
+    return way
+
+
+def cuts_of_members(grid: Grid) -> list[int]:
+    """Return by which of the cuts that open all handles each member is crossed (E,), a bit for each cut.
+
+    Members outside of a tree of members, and of a tree of triangles across the others, are two for each handle; with the tree of
+    triangles each closes a cut. Boundary loops count as closed: each is one more face.
+    """
+    faces = grid.edge_triangles.copy()
+    count, of_node = len(grid.triangles), {}
+    for number, loop in enumerate(grid.boundary_loops):
+        of_node.update({int(node): count + number for node in loop})
+    outer = np.flatnonzero(faces[:, 1] < 0)
+    faces[outer, 1] = [of_node[int(node)] for node in grid.edges[outer, 0]]
+    in_tree, _ = _tree(grid.edges, np.ones(len(grid.edges), bool), len(grid.nodes))
+    across, parents = _tree(faces, ~in_tree, count + len(grid.boundary_loops))
+    cuts = [0] * len(grid.edges)
+    for bit, member in enumerate(np.flatnonzero(~in_tree & ~across).tolist()):
+        ways: list[set[int]] = []
+        for face in faces[member].tolist():
+            way, at = set(), face
+            while parents[at][0] >= 0:  # ends at the root of the tree
+                at, edge = parents[at]
+                way.add(edge)
+            ways.append(way)
+        for edge in (ways[0] ^ ways[1]) | {member}:
+            cuts[edge] |= 1 << bit
+    return cuts
+
+
+def _tree(ends: np.ndarray, allowed: np.ndarray, count: int) -> tuple[np.ndarray, list[tuple[int, int]]]:
+    """Return which links (E, 2) a breadth-first tree takes of those allowed (E,), and parent and link of each of `count` things."""
+    beside: list[list[tuple[int, int]]] = [[] for _ in range(count)]
+    for number in np.flatnonzero(allowed).tolist():
+        one, other = ends[number].tolist()
+        beside[one].append((other, number))
+        beside[other].append((one, number))
+    taken, parents, seen = np.zeros(len(ends), bool), [(-1, -1)] * count, [False] * count
+    for root in range(count):
+        if seen[root]:
+            continue
+        seen[root], layer = True, [root]
+        for at in layer:  # grows; each is put in once
+            for other, number in beside[at]:
+                if not seen[other]:
+                    seen[other], taken[number], parents[other] = True, True, (at, number)
+                    layer.append(other)
+    return taken, parents

@@ -1,0 +1,55 @@
+"""Struts of a grid between parts of a scan that only face each other, told from handles that the scan has."""
+
+import numpy as np
+import pytest
+from marks import compiled_only
+from small_clouds import ball, samples_of, tire
+from typed import known
+
+import scantruss as st
+from scantruss.check.handles import cuts_of_members, false_struts, rings_around_handles
+
+RADIUS, TUBE, HALF_GAP = 4.0, 1.2, 0.15
+
+
+@pytest.fixture(scope="module")
+def whole() -> st.Grid:
+    return st.grid_from_points(tire(RADIUS, TUBE, 0.1), st.Settings(length=1.0, effort="quick"))
+
+
+def two_balls() -> np.ndarray:
+    """Points (N, 3) on two large balls, a third of a member apart where the tire passes from one to the other."""
+    one = ball(3.0, 20_000)
+    return np.concatenate([one + [RADIUS, 3.0 + HALF_GAP, 0.0], one + [RADIUS, -3.0 - HALF_GAP, 0.0]])
+
+
+@compiled_only
+def test_a_strut_between_parts_that_face_each_other_is_said_and_a_handle_of_the_scan_is_none(whole: st.Grid) -> None:
+    assert known(whole.certificate).handles == 1
+    assert "strut" not in {fault.kind for fault in known(whole.certificate).warnings}
+    samples = samples_of(two_balls(), effort="quick")
+    (fault,) = false_struts(
+        whole.replace(origin=samples.origin, nodes=whole.nodes + whole.origin - samples.origin),
+        samples,
+        known(whole.certificate),
+        1.0,
+    )
+    assert fault.kind == "strut"
+    assert np.linalg.norm(np.array(known(fault.where)) - [RADIUS, 0.0, 0.0]) < 1.0
+
+
+def test_rings_around_a_handle_are_short_and_no_part_of_the_grid_lies_in_them(whole: st.Grid) -> None:
+    rings = rings_around_handles(whole)
+    members = set(map(frozenset, whole.edges.tolist()))
+    assert rings and all(len(ring) <= 12 for ring in rings)
+    assert all(
+        frozenset(pair) in members
+        for ring in rings
+        for pair in zip(ring.tolist(), np.roll(ring, 1).tolist(), strict=True)
+    )
+    assert max(cuts_of_members(whole)).bit_length() == 2  # two cuts open one handle
+
+
+def test_a_ball_has_no_ring() -> None:
+    grid = st.grid_from_points(ball(3.0, 4000), st.Settings(length=1.5, effort="quick"))
+    assert rings_around_handles(grid) == []
