@@ -180,6 +180,7 @@ class Tracer:
                 folds, even = self._even_parts(sample, fold, known_places, rough)
                 if not even and (settled := self._settled(sample, fold)) is not None:
                     folds, even = self._even_parts(sample, settled, known_places, rough)
+                    misses = 0 if even else misses  # too short ones are folds too, and no sign of a rough scan
                     even = [part for part in even if len(part) * FOLD_STRIDE >= LEAST_LINE_AT_CREST]
                 ridges += even
                 misses = 0 if even else misses
