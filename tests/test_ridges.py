@@ -82,7 +82,6 @@ def test_the_ridge_of_a_gable_is_a_straight_chain_from_rim_to_rim() -> None:
     assert quality.shape_mean >= 0.985 and quality.length_cv <= 0.08 and grid.topology.euler == 1
 
 
-@compiled_only
 def folded_plate(noise: float, to_member: int, seed: int) -> np.ndarray:
     """A plate of 24 by 16 with five folds across, of 84 degrees, and so many points on the square of a member of 1."""
     rng = np.random.default_rng(seed)
@@ -105,6 +104,7 @@ def test_noise_is_that_of_points_and_not_of_their_means() -> None:
     assert noise_of_points(samples) == pytest.approx(0.03, rel=0.1)
 
 
+@compiled_only
 def test_the_ridges_of_a_groin_vault_cross_in_its_middle() -> None:
     grid = grid_from_points(groin(), Settings(length=SIZE))
     nodes = line_nodes(grid)
@@ -433,17 +433,3 @@ def test_a_ridge_that_curls_up_to_a_tip_ends_in_its_corner() -> None:
     tips = np.array([[x, y, 17.0] for x in (-20.0, 20.0) for y in (-20.0, 20.0)]) - cloud.origin
     away = np.linalg.norm(boundary.loops[0].corners[:, None] - tips, axis=2).min(axis=0)
     assert away.max() < 0.1 * settings.length
-
-
-def test_a_ridge_is_found_from_its_crest_where_it_was_first_seen_beside_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    """From a fold that is seen a little beside the crest the next one lies too far aside to go on."""
-    points, fold_at = folded_plate(0.01, 100, 0), Tracer.fold_at
-
-    def aside(self: Tracer, sample: int, place: np.ndarray, towards: np.ndarray, first: int = 0) -> Any:
-        fold = fold_at(self, sample, place, towards, first)
-        if fold is not None and not towards.any():
-            fold.place += 0.2 * np.cross(self.surface.normals[sample], fold.ahead)
-        return fold
-
-    monkeypatch.setattr(Tracer, "fold_at", aside)
-    assert len(ridges_of(points, 1.0)) == 5

@@ -60,8 +60,6 @@ WIDE_LOOK_SPACING = 0.5  # distance between places at which wide folds are looke
 MOST_SAMPLES = 4000  # most samples from which folds are looked for, the sharpest first
 FALSE_FOLDS_OF_ROUGH = 12  # places in a row that look folded and are no ridge, after which only long ridges count
 MOST_FALSE_FOLDS = 80  # such places in a row after which the search stops
-# least length of a line that is found from its crest only: crests of lobes are shorter [member lengths]
-LEAST_LINE_AT_CREST = 1.5
 # places in a row at which a fold may not be seen and still goes on: beside a corner, a wide one is not for the width of its sides
 MISSED_PLACES, WIDE_MISSED_PLACES = 2, 4
 LEAST_TURN_COSINE = 0.94  # least cosine of the turn of a fold from place to place
@@ -176,12 +174,7 @@ class Tracer:
                 and np.linalg.norm(fold.place - places[k])
                 < (WIDE_FOLD_BESIDE if self.wide else FOLD_BESIDE) * self.length
             ):
-                known_places = [ridge["place"] for ridge in ridges]
-                folds, even = self._even_parts(sample, fold, known_places, rough)
-                if not even and (settled := self._settled(sample, fold)) is not None:
-                    folds, even = self._even_parts(sample, settled, known_places, rough)
-                    misses = 0 if even else misses  # too short ones are folds too, and no sign of a rough scan
-                    even = [part for part in even if len(part) * FOLD_STRIDE >= LEAST_LINE_AT_CREST]
+                folds, even = self._even_parts(sample, fold, [ridge["place"] for ridge in ridges], rough)
                 ridges += even
                 misses = 0 if even else misses
                 for place in folds["place"]:
@@ -197,13 +190,6 @@ class Tracer:
         sharpest = SHARPEST_LIP if self.wide else self.sharpest
         even = [each for each in parts_of_fold(folds) if is_even(each, WEAK_FOLD * self.angle, sharpest, slack)]
         return folds, [part for part in even if not rough or is_clear_on_rough(part, self.angle)]
-
-    def _settled(self, sample: int, fold: np.record) -> np.record | None:
-        """The fold around the crest of one that was found beside it, where both sides are seen alike; None where it is another fold."""
-        again = self.fold_at(sample, fold.place, fold.ahead)
-        if again is None or abs(again.ahead @ fold.ahead) <= LEAST_TURN_COSINE:
-            return None
-        return again if again.bend > WEAK_FOLD * self.angle else None
 
     def is_folded_between(self, first: np.ndarray, last: np.ndarray) -> bool:
         """Whether the scan is folded all along the straight way from one place to another."""
