@@ -4,12 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as some
 from typed import known
 
 import scantruss as st
 from scantruss.check.distances import measure_distances
 from scantruss.check.left_out import points_left_out
 from scantruss.check.missed import largest_patch_missed
+from scantruss.kernels.geometry.boxes import new_boxes
+from scantruss.kernels.scan.lone import mark_lone
 from scantruss.scan.clean.lone import find_lone
 from scantruss.scan.cloud import bounds_of, measure_spacing
 from scantruss.surface.samples import sample_surface
@@ -108,3 +112,17 @@ def test_outliers_are_said_where_most_of_them_are_together() -> None:
     part = next(part for part, _ in found if part.kind == "outliers")
     assert part.points == samples.outliers >= 10 and part.together == 5 and known(part.size) < 0.5
     assert np.linalg.norm(np.array(known(part.where)) - [2.0, 7.0, 4.0]) < 0.2
+
+
+@pytest.mark.kernels
+@settings(max_examples=40, deadline=None)
+@given(some.integers(1, 60), some.floats(0.02, 0.6), some.floats(0.3, 3.0), some.integers(0, 3), some.integers(0, 999))
+def test_points_with_few_others_near_are_those_of_all_distances(
+    count: int, reach: float, box: float, most: int, seed: int
+) -> None:
+    points = np.random.default_rng(seed).uniform(size=(count, 3)).round(1)
+    boxes = new_boxes(points.min(axis=0), points.max(axis=0), box * reach, count, count)
+    lone = np.zeros(count, np.bool_)
+    mark_lone(points, boxes, reach, most, lone)
+    squares = ((points[:, None] - points) ** 2).sum(axis=2)
+    assert (lone == ((squares <= reach * reach).sum(axis=1) <= most + 1)).all()

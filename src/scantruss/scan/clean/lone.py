@@ -6,23 +6,24 @@ import math
 
 import numpy as np
 
+from ...kernels.geometry.boxes import new_boxes
 from ...kernels.geometry.kd_tree import nearest_of_places
+from ...kernels.scan.lone import mark_lone
 from ...kernels.scan.outliers import usual_reaches
 from ...runtime.parallel import run_in_parts
 from ..cloud import Bounds
 from .nearby import NEIGHBORS_OF_A_POINT, SEARCHES_PER_THREAD, Nearby, build_kd_tree
 from .streamline import points_near, streamlined
-from .thinning import MOST_BOXES, number_in_boxes
+from .thinning import MOST_BOXES
 
 MOST_COMPARED = 100_000  # about the most points that are compared with each other; of more some are taken, evenly
 COINCIDING = 0.5  # distance within which points count as one [spacings]
 REACH_OF_SPACING = 1.5  # distance to the eighth neighbour [spacings]
 OTHERS_NEAR = 1  # points that may lie near a lone one: a beam that grazes dust returns twice
 RANK_OF_REACH = 4  # as `outliers.DENSEST_AROUND`
-SPARSE_AROUND, SPARSE_WITHIN = (
-    3,
-    2.0,
-)  # points as far apart that show a sparse part, and within which distance [its own]
+# points as far apart that show a sparse part, and within which distance [its own]
+SPARSE_AROUND, SPARSE_WITHIN = 3, 2.0
+BOX_OF_REACH = 1.0  # width of the boxes in which points near each other are looked for [that distance]
 SPARSE_STEP = 2.0  # step from one such distance to the next
 SPARSE_ROUNDS = 3  # times that points beside those of a sparse part are looked at, from its inside outwards
 
@@ -59,11 +60,10 @@ def find_lone(points: np.ndarray, bounds: Bounds, spacing: float, distance: floa
 
 def _some_are_far(points: np.ndarray, least: float) -> bool:
     """Whether any of the points (N, 3) has no more others within a distance than a lone one may have."""
-    box = number_in_boxes(points, least / math.sqrt(3.0))  # all points of a box are near each other
-    doubted = points[np.bincount(box)[box] <= 1 + OTHERS_NEAR]
-    squares, which = np.empty(len(doubted)), np.empty(len(doubted), np.int64)
-    nearest_of_places(build_kd_tree(points), doubted, 2 + OTHERS_NEAR, squares, which)  # the first is the point itself
-    return bool((squares > least * least).any())
+    boxes = new_boxes(points.min(axis=0), points.max(axis=0), BOX_OF_REACH * least, len(points), len(points))
+    lone = np.zeros(len(points), np.bool_)
+    mark_lone(points, boxes, least, OTHERS_NEAR, lone)
+    return bool(lone.any())
 
 
 def _lone_of(near: Nearby, least: float, distance: float) -> np.ndarray:
