@@ -31,6 +31,9 @@ MANY_ROUGH = 0.007  # share of rough samples above which they are moved; fewer m
 THICKNESS_OF_SHEETS = 0.12  # thickness above which a sample may hold several sheets [member lengths]
 # share of the thick samples that finer ones may leave rough where sheets come apart: those along the edges at which they meet
 SHARE_ALONG_EDGES = 0.2
+# rough samples linked to one along an edge, at least, and the share of them that are: 0.94 and more on walls with a lip, 0.72 and less
+# between layers that are nowhere joined
+SEVERAL_BESIDE, MOST_BESIDE = 3, 0.9
 MOST_REFINEMENTS = 2  # most times that the sample radius is halved to see whether a thick layer is several sheets
 FINEST_RADIUS = 1.0  # smallest radius of a sample [point spacings]
 SMOOTH_THICKNESS = 0.075  # largest thickness of the samples of a smooth scan [member lengths]
@@ -95,8 +98,8 @@ def link_finer(
 ) -> tuple[Linked, float] | None:
     """Return finer samples and their radius if they form smooth sheets, else None.
 
-    Sheets that lie only a few samples apart look like one rough layer; finer samples separate them. Few of these are rough then, along
-    the edges where the sheets meet; in noise most stay so.
+    Sheets that lie only a few samples apart look like one rough layer; finer samples separate them. Few of these are rough then, side by
+    side along the edges where the sheets meet; in noise most stay so.
     """
     thick = float((coarse.thickness > THICKNESS_OF_SHEETS * length).mean())
     for _ in range(MOST_REFINEMENTS):
@@ -104,10 +107,18 @@ def link_finer(
         if radius < FINEST_RADIUS * spacing:
             return None
         found = link_samples(points, radius, length, spacing, given)
-        share = float((found.thickness > ROUGH_SAMPLE * length).mean())
-        if share <= max(SOME_ROUGH, SHARE_ALONG_EDGES * thick):
+        rough = found.thickness > ROUGH_SAMPLE * length
+        if rough.mean() <= SOME_ROUGH or (
+            rough.mean() <= SHARE_ALONG_EDGES * thick and _are_side_by_side(found, rough)
+        ):
             return found, radius
     return None
+
+
+def _are_side_by_side(found: Linked, which: np.ndarray) -> bool:
+    """Whether most of some samples (S,) bool are linked to several of them, as along edges, and not scattered as between two layers."""
+    beside = ((found.neighbors >= 0) & which[found.neighbors]).sum(axis=1)
+    return bool((beside[which] >= SEVERAL_BESIDE).mean() >= MOST_BESIDE)
 
 
 def refined(
