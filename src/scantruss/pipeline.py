@@ -180,8 +180,9 @@ def make_grid_with_wide_ridges(cloud: PointCloud, attempt: Attempt, *, progress:
     plain = make_grid(cloud, first, progress=seen)
     made = made_folds(samples, settings)
     every = tuple(sorted({*made, *crests_cut_off(plain, crests, settings.length)}))
-    for wide, is_taken in ((every, follows_better), (made, follows_ridges_as_well)):
-        if not wide or (wide == made and is_taken is follows_better):
+    tried = {every: follows_better, made: follows_ridges_as_well}  # the second alone where both are the same
+    for wide, is_taken in tried.items():
+        if not wide:
             continue
         with suppress(FrontError):
             folded = make_grid(cloud, replace(first, wide=wide), progress=seen)

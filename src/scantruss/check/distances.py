@@ -20,9 +20,8 @@ if TYPE_CHECKING:
     from ..grid.grid import Grid
     from ..surface.samples import SurfaceSamples
 
-FIRST_REACH = (
-    0.05  # reach of the first search for the nearest triangle; most points have theirs nearer [member lengths]
-)
+# reach of the first search for the nearest triangle; most points have theirs nearer [member lengths]
+FIRST_REACH = 0.05
 REACH_GROWTHS = 50  # times that the reach is made four times as large at most: from any place to all of them
 TRIANGLE_BOX = 0.8  # width of the boxes of triangles [member lengths]
 POINT_BOX = 0.2  # width of the boxes of points [member lengths]

@@ -86,7 +86,8 @@ def sheets_beside(ring: np.ndarray, samples: SurfaceSamples, length: float) -> t
 def rings_around_handles(grid: Grid) -> list[np.ndarray]:
     """Return rings of at most `LONGEST_RING` members that no part of the grid lies within, the shortest first, each its nodes (K,).
 
-    From each node the shortest is found by going outwards: two ways to the ends of a member that cross other cuts close such a ring.
+    Each crosses a cut. From each node at one the shortest is found by going outwards: two ways to the ends of a member that cross other
+    cuts close such a ring.
     """
     cuts = cuts_of_members(grid)
     if not any(cuts):
@@ -96,7 +97,7 @@ def rings_around_handles(grid: Grid) -> list[np.ndarray]:
         beside[one].append((other, cut))
         beside[other].append((one, cut))
     found: dict[frozenset[int], list[int]] = {}
-    for root in range(len(grid.nodes)):
+    for root in np.unique(grid.edges[np.array(cuts) != 0]).tolist():
         ring = _shortest_ring(root, beside)
         if ring:
             found.setdefault(frozenset(ring), ring)

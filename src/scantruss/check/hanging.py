@@ -68,9 +68,8 @@ def nodes_off_sheets(grid: Grid, samples: SurfaceSamples, length: float) -> list
     standing = np.union1d(
         _spikes(grid, samples, desired, LESS_STEEP_MEMBER_SINE, EVEN_FLAT_COSINE), _on_masts(grid, samples, desired)
     )
-    nodes = np.setdiff1d(
-        standing, np.union1d(hanging, grid.lines)
-    )  # the lip of a thin body is no mast: all members leave it
+    # the lip of a thin body is no mast: all members leave it
+    nodes = np.setdiff1d(standing, np.union1d(hanging, grid.lines))
     return _fault("off sheet", "has a node on points that stand off the sheet around it", grid, nodes)
 
 

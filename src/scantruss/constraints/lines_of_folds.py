@@ -13,6 +13,20 @@ GAIN_OF_MADE, LEAST_MADE = 1200.0, 4.0  # the same of one that was made, and its
 LEAST_ROUGH_RIDGE = 6.0  # least length of a line of folds on a rough scan [member lengths]
 ROUGH_SHARE = 1.4  # share of the ridge angle by which half of such a line is folded at least
 TURNS_BACK = np.radians(125.0)  # bend of a wide fold from which on it is a lip
+PLACES_OF_TURN = 3  # places on both sides from which the turn of a line is taken
+CORNER_TURN = 25.0  # by how much a line turns more in a corner than before and after it [degree]
+SHORTEST_LINE_OF_FOLDS = 1.0  # least length of a line of folds [member lengths]
+LEAST_FULL_LENGTH = 0.75  # least length of it with the full angle [member lengths]
+SHARPEST_FOLD_ANGLE = 125.0  # a surface that bends by more is not folded but turns back: two sheets [degree]
+SHARPEST_LIP = 200.0  # most that a surface bends at a wide fold, whose sides are known: the lip of a thin body turns by 180 [degree]
+SHARPEST_EDGE = 155.0  # most that a surface bends at a fold where sharp edges of bodies are looked for [degree]
+# median change of the bend from place to place, at most, of folds by up to 50 degrees and by 70 or more [degree]: blunt crests of nature
+# are as sharp as blunt ridges that were made, but not as even
+EVEN_FOLDS = (0.5, 3.5)
+BLUNT_FOLD, ACUTE_FOLD = 50.0, 70.0  # angles of folds between which the allowed change of the bend grows [degree]
+BY_NOISE = 0.2  # change of the bend that noise explains, for the root of the gain 1 [radian]
+WIDE_UNEVEN = 2.0  # further change of the bend that is allowed of wide folds, whose places are less certain [degree]
+SURE_GAIN = 25.0  # median gain, at least (F statistic)
 
 
 def squares_between(places: np.ndarray, folds: np.ndarray) -> np.ndarray:
@@ -49,22 +63,6 @@ def is_sharp(folds: np.ndarray, angle: float) -> bool:
     full = folds["bend"] >= NEARLY_FULL_ANGLE * angle
     size = float(full.sum()) * FOLD_STRIDE
     return bool(size >= LONG_FULL or (size >= LEAST_FULL_LENGTH and full.mean() >= LEAST_FULL_SHARE))
-
-
-PLACES_OF_TURN = 3  # places on both sides from which the turn of a line is taken
-CORNER_TURN = 25.0  # by how much a line turns more in a corner than before and after it [degree]
-SHORTEST_LINE_OF_FOLDS = 1.0  # least length of a line of folds [member lengths]
-LEAST_FULL_LENGTH = 0.75  # least length of it with the full angle [member lengths]
-SHARPEST_FOLD_ANGLE = 125.0  # a surface that bends by more is not folded but turns back: two sheets [degree]
-SHARPEST_LIP = 200.0  # most that a surface bends at a wide fold, whose sides are known: the lip of a thin body turns by 180 [degree]
-SHARPEST_EDGE = 155.0  # most that a surface bends at a fold where sharp edges of bodies are looked for [degree]
-# median change of the bend from place to place, at most, of folds by up to 50 degrees and by 70 or more [degree]: blunt crests of nature
-# are as sharp as blunt ridges that were made, but not as even
-EVEN_FOLDS = (0.5, 3.5)
-BLUNT_FOLD, ACUTE_FOLD = 50.0, 70.0  # angles of folds between which the allowed change of the bend grows [degree]
-BY_NOISE = 0.2  # change of the bend that noise explains, for the root of the gain 1 [radian]
-WIDE_UNEVEN = 2.0  # further change of the bend that is allowed of wide folds, whose places are less certain [degree]
-SURE_GAIN = 25.0  # median gain, at least (F statistic)
 
 
 def parts_of_fold(folds: np.ndarray) -> list[np.ndarray]:

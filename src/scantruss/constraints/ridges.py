@@ -66,7 +66,8 @@ class FoldLines:
         tracer, length = self._tracer, self.length
         # pieces of a wide fold look like weak ones, or like ones in the noise
         traced = [folds for folds in self.narrow if not self._is_piece_of(folds, wide)]
-        traced.sort(key=lambda folds: not is_sharp(folds, tracer.angle)) if wide else None
+        if wide:
+            traced.sort(key=lambda folds: not is_sharp(folds, tracer.angle))
         traced += wide
         lines = [
             Ridge(

@@ -59,9 +59,8 @@ class LeftOut:
     farthest: float | None = None  #: largest distance from the grid [scan unit]
     asked: bool = False  #: a setting asked for it; else it was ScanTruss's own judgement
     number: int = 1  #: holes or gaps, where it is several
-    together: int | None = (
-        None  #: of scattered points, how many the most beside each other are; then `where` and `size` are theirs
-    )
+    #: of scattered points, how many the most beside each other are; then `where` and `size` are theirs
+    together: int | None = None
 
     @property
     def words(self) -> str:
