@@ -126,6 +126,7 @@ def _samples_inside(samples: SurfaceSamples, added: np.ndarray, inside: Inside, 
         cut,
         scan=np.ascontiguousarray(samples.scan[kept]),
         judged=samples.judged[kept],
+        lone=samples.lone[kept] if len(samples.lone) else samples.lone,
         unread=(*samples.unread, *beyond),
         whole=whole,
     )

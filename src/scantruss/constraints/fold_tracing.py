@@ -72,6 +72,7 @@ OFF_SCAN = 0.3  # a place farther from the scan than this has left it [member le
 LOOK_AROUND = 0.12  # radius within which the scan is looked for below a ridge [member lengths]
 SHARE_BELOW = 0.25  # share of that radius by which the scan may lie below a sharp ridge
 FAR_OFF = 0.08  # a place on a ridge farther from all points than this is moved to the nearest [member lengths]
+POINTS_AT_LIP = 7  # points nearest to the line of a lip whose middle height is its own
 FEWEST_AROUND = 5  # fewest points that show whether a place lies off them
 HALF_NARROW_LIP = 0.3  # half the width of a lip below which one line stands for both of its edges [member lengths]
 PLACES_OF_EDGE = 12  # places along a line of folds, about, at which a lip is looked for
@@ -203,9 +204,9 @@ class Tracer:
                 return False
         return True
 
-    def onto_scan(self, places: np.ndarray) -> np.ndarray:
-        """Places (K, 3) along a ridge, moved to the scan where the fold is rounded and they lie off it."""
-        above = np.array([self._above(place) for place in places])
+    def onto_scan(self, places: np.ndarray, *, lip: bool = False) -> np.ndarray:
+        """Places (K, 3) along a ridge, moved to the scan where the fold is rounded and they lie off it; those of a lip all."""
+        above = np.array([self._above(place, lip) for place in places])
         moved: np.ndarray = places - smoothed(above)
         return moved
 
@@ -295,8 +296,8 @@ class Tracer:
             and abs(fold.ahead @ ahead) > LEAST_TURN_COSINE
         )
 
-    def _above(self, place: np.ndarray) -> np.ndarray:
-        """By how much a place on a ridge lies off nine tenths of the points below or above it, (3,)."""
+    def _above(self, place: np.ndarray, lip: bool) -> np.ndarray:
+        """By how much a place on a ridge lies off nine tenths of the points below or above it, on a lip off half of the nearest, (3,)."""
         x, y, z = place.tolist()
         sample = nearest_sample(self.surface, x, y, z)
         *normal, taken = kernels.points_around(self.surface, sample, (x, y, z), self.radii[-1], self.buffer)
@@ -310,6 +311,10 @@ class Tracer:
             beside: np.ndarray = -away[nearest]
             return beside if distance_from_scan(self.surface, place) > far else np.zeros(3)
         heights = away @ ahead
+        if lip:
+            near = np.argsort(squares - heights**2, kind="stable")[:POINTS_AT_LIP]
+            up: np.ndarray = ahead * float(np.median(heights[near]))
+            return -up
         radius = max(LOOK_AROUND * self.length, 2.5 * self.spacing)
         heights = np.sort(heights[squares - heights**2 < radius**2])
         tenth = len(heights) // 10

@@ -79,7 +79,10 @@ class FoldLines:
             for folds in traced
         ]
         ridges = whole_lips(kept_ridges(join_ends(lines, length), length), length)
-        ridges = [ridge.moved(tracer.onto_scan(ridge.places)) for ridge in ridges + short_ridges(ridges, tracer)]
+        ridges = [
+            ridge.moved(tracer.onto_scan(ridge.places, lip=ridge.lip))
+            for ridge in ridges + short_ridges(ridges, tracer)
+        ]
         return tuple(sorted(ridges, key=lambda ridge: (ridge.ring, -len(ridge.places))))
 
     def _has_edges(self, lip: np.ndarray) -> bool:
