@@ -179,7 +179,7 @@ def _points_of(found: Linked, which: np.ndarray) -> np.ndarray:
 def _widens(points: np.ndarray, ends: np.ndarray, beyond: np.ndarray) -> bool:
     """Whether points (N, 3) form a straight strip that widens evenly up to the end where it meets a sheet, or beyond it.
 
-    ends : (K, 3) places where it meets the sheet, some of them perhaps stray
+    ends : (K, 3) places where it meets the sheet, perhaps with an outlier or two
     beyond : (M, 3) points of the sheet around them
     """
     middle = points.mean(axis=0)

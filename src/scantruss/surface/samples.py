@@ -28,21 +28,19 @@ from .chosen_samples import (
     Asked,
     ChosenSamples,
     choose_samples_of,
-    radius_of_samples,
     usual_samples,
 )
 from .faced_surface import faced_surface
 from .floor import find_floor
 from .given_normals import GivenNormals, given_normals
 from .limbs import LimbRing, cut_limbs
-from .linked_samples import LINKED_POINTS_PER_THREAD, PATCH_SPACING, Linked, group, link_samples
+from .linked_samples import LINKED_POINTS_PER_THREAD, PATCH_SPACING, group
 from .of_cloud import cloud_has_outliers, lone_of_cloud
 from .owners import owners_of
 from .pieces import by_size, chosen_pieces, large_pieces, number_pieces, places_to_count, sample_areas
-from .rods import lengths_of_rods, pieces_of_rods, rod_points
+from .rods_at_lengths import points_of_rods
 from .shape import check_is_surface, layers_of_surface
 from .size_field import length_field
-from .supports import free_columns, support_samples
 
 BESIDE_SAMPLES = 1.5  # distance from points of the boundary within which all points are used [`sample_spacing`]
 UNCLEANED_DISTANCE = 3.0  # as `Settings.outlier_distance`, where a scan is not cleaned
@@ -311,7 +309,7 @@ def _prepare(
     if chosen.judged is not None:
         judged[judged == KEPT] = chosen.judged
     if not asked.keep_rods and thinned:
-        rod = _rods_of(scan[judged == KEPT], spacing, asked)
+        rod = points_of_rods(scan[judged == KEPT], spacing, asked)
         judged[np.flatnonzero(judged == KEPT)[rod]] = ROD
         left = np.ascontiguousarray(scan[judged == KEPT])
         chosen = usual_samples(left, bounds_of(left), spacing, asked._replace(outlier_distance=0.0), given, thinned)
@@ -377,30 +375,3 @@ def _faced(chosen: ChosenSamples, spacing: float, asked: Asked) -> tuple[Surface
     """Return the surface of the samples with its length field; each one's piece, and whether it lies on a sharp edge."""
     surface, piece, on_edge = faced_surface(chosen.found, chosen.radius, asked.length, spacing, asked.sharp_edges)
     return surface._replace(field=length_field(surface, asked.wish)), piece, on_edge
-
-
-def _rods_of(points: np.ndarray, spacing: float, asked: Asked) -> np.ndarray:
-    """Return which points (N, 3) belong to rods, (N,) bool: seen at shorter lengths too, as long members blur a scaffold with its shell."""
-    lengths = lengths_of_rods(asked.length, spacing)
-    radii = [radius_of_samples(asked._replace(length=length), spacing) for length in lengths]
-    finest = link_samples(points, radii[0], lengths[0], spacing)
-    column = (finest.owner >= 0) & (free_columns(finest.mean, radii[0], asked.length)[finest.owner] > 0)
-    rods = np.zeros(len(points), np.bool_)
-    for length, radius in zip(lengths, radii, strict=True):
-        left = np.flatnonzero(~rods)
-        first = length == lengths[0]
-        found = finest if first else link_samples(np.ascontiguousarray(points[left]), radius, length, spacing)
-        known = column[left] & (length == lengths[-1])
-        rods[left[_rods_at(length, found, known, asked)]] = True
-    if len(lengths) > 1 and rods.any():
-        rods |= pieces_of_rods(finest, rods, radii[0], asked.length)
-    return rods if not rods.all() else np.zeros(len(points), np.bool_)  # then they are the scan itself
-
-
-def _rods_at(length: float, found: Linked, column: np.ndarray, asked: Asked) -> np.ndarray:
-    """Return which points (N,) bool belong to rods by their samples for a member length, of which some are known for columns (N,) bool."""
-    samples = len(found.mean)
-    owner = np.where(found.owner >= 0, found.owner, samples)
-    support = 2 * np.bincount(owner, column, samples + 1) > np.bincount(owner, minlength=samples + 1)
-    known = support[:samples] | support_samples(found, length) if asked.z_is_up else support[:samples]
-    return rod_points(found, len(column), length, known)

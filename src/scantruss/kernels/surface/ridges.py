@@ -241,6 +241,16 @@ def is_folded(surface: Surface, sample: int, radius: float, least: float, buffer
 
 
 @kernel
+def note_near(surface: Surface, seeds: np.ndarray, i: int, apart: float, note: np.ndarray) -> None:
+    """Note the seeds (samples) after seed i that are nearer to it than `apart`; note : (K,) int64, 1 for these."""
+    place = row(surface.mean, seeds[i])
+    for j in range(i + 1, len(seeds)):
+        d = subtract(row(surface.mean, seeds[j]), place)
+        if dot(d, d) < apart * apart:
+            note[j] = 1
+
+
+@kernel
 def keep_folded(
     surface: Surface, seeds: np.ndarray, radius: float, least: float, apart: float, buffer: np.ndarray, note: np.ndarray
 ) -> int:
@@ -252,11 +262,7 @@ def keep_folded(
     for i in range(len(seeds)):
         if note[i] != 0:
             continue
-        place = row(surface.mean, seeds[i])
-        for j in range(i + 1, len(seeds)):
-            d = subtract(row(surface.mean, seeds[j]), place)
-            if dot(d, d) < apart * apart:
-                note[j] = 1
+        note_near(surface, seeds, i, apart, note)
         if is_folded(surface, seeds[i], radius, least, buffer):
             seeds[kept] = seeds[i]
             kept += 1

@@ -24,7 +24,7 @@ from ..geometry.vectors import (
     unit,
 )
 from .local_surface import Surface, flood, walk
-from .ridges import FOLD, LARGEST_GAIN
+from .ridges import FOLD, LARGEST_GAIN, note_near
 
 SIDES_FROM, SIDES_TO = 0.75, 1.6  # the sides of a wide fold are looked at so far from its line [member lengths]
 CREST_WITHIN = 0.6  # its crest is fitted to samples so near to its line [member lengths]
@@ -198,11 +198,8 @@ def keep_wide_folds(
     for i in range(len(seeds)):
         if note[i] != 0:
             continue
+        note_near(surface, seeds, i, apart, note)
         place = row(surface.mean, seeds[i])
-        for j in range(i + 1, len(seeds)):
-            d = subtract(row(surface.mean, seeds[j]), place)
-            if dot(d, d) < apart * apart:
-                note[j] = 1
         fits = fit_wide_fold(surface, seeds[i], place, (0.0, 0.0, 0.0), fold[0])
         if fits and fold[0].bend >= least and fold[0].gain >= sure:
             seeds[kept] = seeds[i]
