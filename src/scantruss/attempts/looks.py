@@ -11,6 +11,7 @@ from ..constraints.ridges import find_ridges
 from ..front.orientation_field import usual_starts
 from ..surface.chosen_samples import ROD
 from ..surface.samples import sample_surface
+from ..surface.shape import wall_of_surface
 from ..surface.sharp_edges import EDGE_SHARE, FEWEST_NEEDED
 from ..surface.supports import are_columns, free_columns
 
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 ROUGH_SCAN, VERY_ROUGH_SCAN = 0.02, 0.25
 MANY_OUTLIERS = 0.002  # share of the points that must be outliers for a grid to be tried without them
 SAID_BESIDE_RODS = ("aside", "far", "peak")  # kinds of warnings of a grid that runs along rods, or misses them
+THIN_WALL, SOME_WALLS = 0.8, 0.05  # thickness of a thin wall [member lengths], and share of the places that have one
 BESIDE_RODS = 0.5  # distance from a rod within which the place of a warning is beside it [member lengths]
 # by how much nearer a hundredth of the points must lie, in members, where members are unevener by 1 (std of their lengths / mean)
 NEARER_FOR_UNEVENER = 2.0
@@ -58,6 +60,14 @@ class AskedScan:
     def has_sharp_edges(self) -> bool:
         """Whether sharp edges are worth a look that was not asked for."""
         return self.by_default and not self.asked.sharp_edges and _has_sharp_edges(self.cloud, self.asked)
+
+    @cached_property
+    def has_thin_walls(self) -> bool:
+        """Whether the scan has both sides of a wall thinner than a member, which its samples do not tell apart."""
+        if not self.by_default or self.asked.thin_walls or self.cloud.normals is not None or self.rough < ROUGH_SCAN:
+            return False
+        samples = sample_surface(self.cloud, self.asked.replace(thin_walls=True))
+        return wall_of_surface(samples, THIN_WALL * self.asked.length)[1] > SOME_WALLS
 
     @cached_property
     def has_plain_body(self) -> bool:

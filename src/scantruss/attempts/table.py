@@ -158,6 +158,7 @@ def _samples_fit(share: float) -> Callable[[AskedScan, Settings], bool]:
 ROWS_TRIED: tuple[AttemptRow, ...] = (
     AttemptRow(AS_ASKED, FIRST_LAYOUT),
     AttemptRow("hall without its columns", ALL_LAYOUTS, lambda scan, now: scan.stands_on_rods, {"keep_rods": False}),
+    AttemptRow("thin walls", FIRST_TWO_LAYOUTS, lambda scan, now: scan.has_thin_walls, {"thin_walls": True}),
     AttemptRow("front without rows", SECOND_LAYOUT),
     AttemptRow("rows turned", TURNED_ROWS, lambda scan, now: scan.has_one_lattice(now)),
     # where edges, limbs or slits are in the way, other fronts seldom help

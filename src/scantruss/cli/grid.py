@@ -183,6 +183,7 @@ def grid_with_notes(
     for name, words in {
         "judge_outliers": "no grid passes with the outliers of this scan, so they are left out, as with --judge-outliers always",
         "sharp_edges": "no grid passes without a look at the sharp edges of this body, so it is made as with --sharp-edges",
+        "thin_walls": "no grid passes without a closer look at the sides of the walls of this scan, so it is made as with --thin-walls",
         "plain_body": "no grid passes with all thin limbs and slits of this body, so it is made without, as with --plain-body",
         "keep_rods": "a grid with the columns, scaffold or cables of this scan fails or misses them: what was found of them is left out",
         "limb_girth": f"no grid passes with thin limbs cut off as asked, so it is made as with --limb-girth {made.limb_girth:g}",

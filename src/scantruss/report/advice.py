@@ -167,6 +167,7 @@ class Advice:
                 judge_outliers=made.judge_outliers,
                 sharp_edges=made.sharp_edges,
                 plain_body=made.plain_body,
+                thin_walls=made.thin_walls,
             )
         except (FrontError, InputError) as error:
             if not isinstance(error, (FrontError, LengthError, LinesError, OneSidedError)) and not self._is_nearby:

@@ -214,6 +214,11 @@ class SurfaceSettings(_Checked):
         "look for edges at which two sides of a body meet at less than about 60 degrees; tried automatically if no grid passes"
         " (default method only)",
     )
+    thin_walls: bool = _setting(
+        False,
+        "tell the two sides of a thin wall apart, as of a vase, before samples are chosen; tried automatically if no grid passes"
+        " (only for a scan without normals)",
+    )
     plain_body: bool = _setting(
         False,
         "take limbs thinner than 0.9 members off the body that the scan encloses, and fill slits narrower than 0.6 members;"

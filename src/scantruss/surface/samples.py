@@ -41,6 +41,7 @@ from .pieces import by_size, chosen_pieces, large_pieces, number_pieces, places_
 from .rods_at_lengths import points_of_rods
 from .shape import check_is_surface, layers_of_surface
 from .size_field import length_field
+from .thin_walls import normals_of_walls
 
 BESIDE_SAMPLES = 1.5  # distance from points of the boundary within which all points are used [`sample_spacing`]
 UNCLEANED_DISTANCE = 3.0  # as `Settings.outlier_distance`, where a scan is not cleaned
@@ -184,7 +185,10 @@ def sample_surface(cloud: PointCloud, settings: Settings) -> SurfaceSamples:
         for oldest in list(kept)[: max(0, len(kept) + 1 - most)]:
             del kept[oldest]
         lone = lone_of_cloud(cloud, asked.outlier_distance or UNCLEANED_DISTANCE)
-        made = _prepare(cloud.points, cloud.bounds, cloud.spacing, asked, given_normals(cloud), lone=lone)
+        given = given_normals(cloud)
+        if given is None and asked.thin_walls:
+            given = normals_of_walls(cloud.points, cloud.spacing, asked.length)
+        made = _prepare(cloud.points, cloud.bounds, cloud.spacing, asked, given, lone=lone)
         check_is_surface(made)
         unread = (*cloud.left_out, *((WITHOUT_COORDINATES, cloud.dropped) for _ in range(cloud.dropped > 0)))
         kept[asked] = replace(
