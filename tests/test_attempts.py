@@ -134,6 +134,17 @@ def test_a_grid_along_rods_is_followed_by_one_attempt_without_and_the_better_is_
     assert len(driven(course, {AS_ASKED: grids[2]})) == 2 and course.outcome() is grids[2]
 
 
+def test_a_grid_that_breaks_a_limb_is_none_that_passes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("scantruss.attempts.course.breaks_limb", lambda *_: (1.0, 2.0, 3.0))
+    course = AttemptCourse(st.PointCloud.from_array(CLOUDS["cap"][0]), st.Settings(length=1.0))
+    grid = cast(Any, SimpleNamespace(certificate=None, cells="triangle"))
+    made = driven(course, {AS_ASKED: grid})
+    assert len(made) > 2
+    with pytest.raises(st.CertificateError, match="torn at a limb") as refused:
+        course.outcome()
+    assert refused.value.where == (1.0, 2.0, 3.0)
+
+
 def test_ridges_are_given_up_right_after_the_fault_and_the_first_fault_counts(monkeypatch: pytest.MonkeyPatch) -> None:
     def after(self: Attempt, fault: FrontError, cloud: st.PointCloud) -> Attempt | None:
         if self.row not in (AS_ASKED, RIDGES_GIVEN_UP) or len(self.faults) == 2:

@@ -1,6 +1,7 @@
 """Multi-start: the flat list of attempts, which of them is kept, and what more effort leaves."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from itertools import pairwise, product
 from pathlib import Path
 from types import SimpleNamespace
@@ -324,6 +325,11 @@ def test_fronts_that_would_all_miss_the_same_limbs_are_not_tried() -> None:
         for _ in range(2):
             limit.note(attempt, fault(kind))
         assert limit.allows(attempt) == tried
+        limit = AttemptLimit()
+        limit.note(attempt, fault(kind))
+        for change, alike in (({"sharp_edges": True}, True), ({"method": "paper"}, True), ({"limb_girth": 2.4}, False)):
+            other = replace(attempt, settings=attempt.settings.replace(**cast(Any, change)))
+            assert limit.allows(other) == (tried or not alike)
 
 
 @compiled_only

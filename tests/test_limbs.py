@@ -12,6 +12,7 @@ from typed import known
 
 import scantruss as st
 from scantruss.check.left_out import _beyond_cut
+from scantruss.check.sheets import broken_limb
 from scantruss.cli.main import main
 from scantruss.kernels.surface.girths import FACING_OPPOSITE, mark_opposite, measure_girths
 from scantruss.surface.chosen_samples import KEPT, LIMB
@@ -138,16 +139,16 @@ def test_limb_girth_0_cuts_nothing_off() -> None:
     assert not samples_of(body(4.5, 1.5), limb_girth=0.0).rings
 
 
-def handle(girth: float) -> np.ndarray:
-    """A ball with a handle: half of a ring that stands in it."""
-    rng = np.random.default_rng(0)
-    ball = rng.normal(size=(int(30 * 4 * np.pi * 16), 3))
+def handle(girth: float, middle: float = 4.0, bend: float = 2.5, density: float = 30.0, seed: int = 0) -> np.ndarray:
+    """A ball with a handle: a part of a ring that stands in it, by its middle and its radius."""
+    rng = np.random.default_rng(seed)
+    ball = rng.normal(size=(int(density * 4 * np.pi * 16), 3))
     ball *= 4.0 / np.linalg.norm(ball, axis=1)[:, None]
     thick = girth / (2 * np.pi)
-    around, turn = rng.uniform(0, 2 * np.pi, (2, int(30 * 2 * np.pi * 2.5 * girth)))
-    out = 2.5 + thick * np.cos(turn)
-    ring = np.column_stack([4.0 + out * np.cos(around), out * np.sin(around), thick * np.sin(turn)])
-    away = np.hypot(np.hypot(ball[:, 0] - 4.0, ball[:, 1]) - 2.5, ball[:, 2])
+    around, turn = rng.uniform(0, 2 * np.pi, (2, int(density * 2 * np.pi * bend * girth)))
+    out = bend + thick * np.cos(turn)
+    ring = np.column_stack([middle + out * np.cos(around), out * np.sin(around), thick * np.sin(turn)])
+    away = np.hypot(np.hypot(ball[:, 0] - middle, ball[:, 1]) - bend, ball[:, 2])
     return np.concatenate([ball[away > thick], ring[np.linalg.norm(ring, axis=1) > 4.0]])
 
 
@@ -157,6 +158,58 @@ def test_a_thin_handle_is_cut_off_at_both_ends() -> None:
     assert len(samples.rings) == 2 and len(samples.pieces) == 1
     cut, off = samples.judged == LIMB, points[:, 0] > 4.5
     assert cut[off].all() and not cut[np.linalg.norm(points, axis=1) < 4.01].any()
+
+
+@pytest.mark.parametrize(
+    ("girth", "middle", "bend", "density", "seed"),
+    [
+        (1.5, 6.0, 2.8, 60.0, 1),  # so thin that the normals of the usual samples on it tell nothing
+        (1.5, 2.5, 3.2, 30.0, 0),  # at so acute an angle with the body that fine samples turn it inside out
+        (2.6, 3.0, 2.0, 30.0, 0),
+    ],
+)
+def test_a_handle_is_cut_off_however_thin_and_at_whatever_angle(
+    girth: float, middle: float, bend: float, density: float, seed: int
+) -> None:
+    points = handle(girth, middle, bend, density, seed)
+    samples = samples_of(points)
+    assert len(samples.rings) == 2 and len(samples.pieces) == 1
+    cut, away = samples.judged == LIMB, np.linalg.norm(points, axis=1)
+    assert cut[away > 5.3].all() and cut[away < 4.01].mean() < 0.005
+
+
+def test_a_hole_through_a_body_is_no_limb_that_is_turned() -> None:
+    rng = np.random.default_rng(0)
+    around, across = rng.uniform(0, 2 * np.pi, 4000), rng.uniform(-2.0, 2.0, 4000)
+    hole = np.column_stack([0.3 * np.cos(around), 0.3 * np.sin(around), across])
+    x, y, side = rng.uniform(-4.0, 4.0, 8000), rng.uniform(-4.0, 4.0, 8000), rng.choice([-2.0, 2.0], 8000)
+    faces = np.column_stack([x, y, side])[np.hypot(x, y) > 0.3]
+    x, z, wall = rng.uniform(-4.0, 4.0, 8000), rng.uniform(-2.0, 2.0, 8000), rng.choice([-4.0, 4.0], 8000)
+    walls = np.concatenate([np.column_stack([x, wall, z])[::2], np.column_stack([wall, x, z])[::2]])
+    assert not samples_of(np.concatenate([hole, faces, walls])).rings
+
+
+def test_a_handle_is_broken_where_a_part_of_it_is_missed_between_two_that_are_followed() -> None:
+    points, length = handle(2.3), 1.0
+    samples = samples_of(points, limb_girth=0.0)
+    limb = (points[:, 0] > 4.5) & (np.linalg.norm(points, axis=1) > 4.01)
+    along = np.arctan2(points[:, 1], points[:, 0] - 4.0)  # along the handle, 0 at its middle
+
+    def broken(missed: np.ndarray) -> Any:
+        return broken_limb(samples, limb, np.where(limb & missed, 1.5 * length, 0.0), length)
+
+    middle = known(broken(np.abs(along) < 0.6))
+    assert np.linalg.norm(np.array(middle) - [6.5, 0.0, 0.0]) < 0.8
+    assert broken(along > 0.3) is not None  # one side up to the body
+    assert broken(np.abs(along) < 0.0) is None
+
+
+def test_a_limb_that_ends_sooner_is_not_broken() -> None:
+    points = body(4.5, 1.5)
+    samples = samples_of(points, limb_girth=0.0)
+    limb = points[:, 0] > 6.0
+    assert broken_limb(samples, limb, np.where(points[:, 0] > 9.0, 2.0, 0.0), 1.0) is None
+    assert broken_limb(samples, limb, np.where(np.abs(points[:, 0] - 9.0) < 1.0, 2.0, 0.0), 1.0) is not None
 
 
 def test_a_handle_of_three_members_is_not() -> None:

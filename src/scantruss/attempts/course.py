@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 from ..check.limits import with_ridges_given_up
 from ..errors import CertificateError, FrontError, OneSidedError, ScanTrussError
-from .limit import AttemptLimit, joins_sheets, only_leaves_out
-from .looks import runs_along_rods, stands_on_columns
+from .limit import AttemptLimit, joins_sheets, loses_limbs, only_leaves_out
+from .looks import breaks_limb, runs_along_rods, stands_on_columns
 from .table import attempts
 
 if TYPE_CHECKING:
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 LEAST_EFFORT = "quick"
 WITHOUT_RODS = "passes, but along rods: without them"
+BREAKS_LIMB = "the grid is torn at a limb thinner than its members"
 RIDGES_GIVEN_UP = "ridges given up near the faults"
 
 
@@ -103,7 +104,11 @@ class AttemptCourse:
         return True
 
     def passed(self, attempt: Attempt, grid: Grid) -> None:
-        """Note that a grid passes the checks."""
+        """Note that a grid passes the checks; it fails all the same where it breaks a limb that could be cut off at a clean ring."""
+        if (place := breaks_limb(grid, self._cloud, self._settings, attempt.settings)) is not None:
+            if self._passed is None:
+                self.failed(attempt, CertificateError(BREAKS_LIMB, grid, place))
+            return
         grid = with_ridges_given_up(grid, attempt.ridges_given_up(self._cloud))
         if self._passed is not None:  # this one is without rods
             assert grid.certificate is not None and self._passed.certificate is not None
@@ -111,7 +116,7 @@ class AttemptCourse:
             self._passed = grid if fewer or self._around_columns else self._passed
             return
         self._around_columns = stands_on_columns(self._cloud, attempt.settings)
-        if self._around_columns or runs_along_rods(grid, self._cloud, attempt.settings):
+        if self._around_columns or runs_along_rods(grid, self._cloud, attempt.settings, self._settings):
             assert self._row_begun is not None
             without = self._row_begun.settings.replace(keep_rods=False)
             self._follows = replace(self._row_begun, settings=without, row=WITHOUT_RODS)
@@ -129,7 +134,8 @@ class AttemptCourse:
         if isinstance(fault, FrontError):
             self._limit.end(fault)
             self._first_fault = self._first_fault or fault
-            later = attempt.after(fault, self._cloud) if self._limit.any_left() else None
+            hopeless = loses_limbs(attempt.settings, fault) or not self._limit.any_left()
+            later = None if hopeless else attempt.after(fault, self._cloud)
             if later is not None:
                 self._follows = replace(later, row=RIDGES_GIVEN_UP)
                 return

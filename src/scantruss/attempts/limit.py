@@ -19,6 +19,10 @@ MOST_RUNS_OF_CELLS = 3  # grids of quads or hexagons that are made at most; they
 MOST_FAR, MOST_GIVEN_UP = 2, 3  # attempts in a row of the same settings that are so far from passing, and such settings
 # such attempts in a row for a body without thin limbs, which is so smooth that other fronts come no nearer
 MOST_FAR_OF_BODY = 1
+# by how much more than may be missing is cut off where no front leaves out less: some follows the ends of a limb a little farther
+LIMBS_BY_FRONT = 1.1
+# settings by which limbs are cut off, and what may be left of them, beside how far the samples are apart
+CUTS_BY = ("limb_girth", "keep_rods", "judge_outliers", "smooth_scale")
 
 
 def only_leaves_out(fault: ScanTrussError) -> TypeGuard[CertificateError]:
@@ -38,6 +42,14 @@ def joins_sheets(fault: ScanTrussError | None) -> bool:
     return found.pieces < found.scan_pieces or (found.pieces > found.scan_pieces and not found.manifold)
 
 
+def loses_limbs(settings: Settings, fault: ScanTrussError, margin: float = LIMBS_BY_FRONT) -> bool:
+    """Whether more of the scan was cut off as limbs too thin than may be missing, times a margin: no other front changes that."""
+    found = fault.grid.certificate if isinstance(fault, CertificateError) else None
+    if found is None:
+        return False
+    return sum(part.share for part in found.left_out if part.kind == "limbs") > margin * settings.allow_missing
+
+
 class AttemptLimit:
     """Which attempts are still worth making.
 
@@ -50,6 +62,7 @@ class AttemptLimit:
         self._allowed = MOST_RUNS
         self._far: list[tuple[Settings, int]] = []  # settings, and how many attempts in a row were far from passing
         self._given_up = self._of_cells = 0
+        self._losing_limbs: list[Settings] = []  # settings with which more is cut off than may be missing
         self.runs, self._looks_one_sided = 0, False  #: grids that were made
 
     def allow(self, more: int) -> None:
@@ -80,6 +93,8 @@ class AttemptLimit:
         """Whether an attempt is worth making."""
         if self._looks_one_sided and not attempt.settings.smooth_scale:
             return False
+        if any(_cuts_alike(attempt.settings, known) for known in self._losing_limbs):
+            return False
         return self._far_in_a_row(attempt.settings) < (MOST_FAR_OF_BODY if attempt.settings.plain_body else MOST_FAR)
 
     def _far_in_a_row(self, settings: Settings) -> int:
@@ -89,6 +104,8 @@ class AttemptLimit:
     def note(self, attempt: Attempt, fault: ScanTrussError) -> None:
         """Note what has come of an attempt."""
         self._looks_one_sided |= isinstance(fault, OneSidedError)
+        if loses_limbs(attempt.settings, fault):
+            self._losing_limbs.append(attempt.settings)
         far = self._far_in_a_row(attempt.settings) + 1 if _is_far_from_passing(attempt, fault) else 0
         self._far = [pair for pair in self._far if pair[0] != attempt.settings] + [(attempt.settings, far)]
         self._given_up += far == MOST_FAR and not attempt.settings.smooth_scale  # of those there are four
@@ -103,7 +120,11 @@ def _is_far_from_passing(attempt: Attempt, fault: ScanTrussError) -> bool:
     if not isinstance(fault, CertificateError) or fault.grid.certificate is None:
         return False
     found = fault.grid.certificate
-    limbs = sum(part.share for part in found.left_out if part.kind == "limbs")
-    if found.missing > FAR_MISSING * attempt.settings.allow_missing or limbs > attempt.settings.allow_missing:
+    if found.missing > FAR_MISSING * attempt.settings.allow_missing or loses_limbs(attempt.settings, fault, 1.0):
         return True
     return found.crossings + abs(found.boundary_loops - found.scan_loops) > FAR_FROM_PASSING
+
+
+def _cuts_alike(settings: Settings, other: Settings) -> bool:
+    """Whether two settings cut the same limbs off a scan: it is cut before the first front, whatever is done later."""
+    return all(getattr(settings, name) == getattr(other, name) for name in CUTS_BY)

@@ -7,15 +7,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..check.distances import measure_distances
+from ..check.sheets import broken_limb
 from ..constraints.ridges import find_ridges
 from ..front.orientation_field import usual_starts
-from ..surface.chosen_samples import ROD
+from ..surface.chosen_samples import KEPT, LIMB, ROD
 from ..surface.samples import sample_surface
 from ..surface.shape import wall_of_surface
 from ..surface.sharp_edges import EDGE_SHARE, FEWEST_NEEDED
 from ..surface.supports import are_columns, free_columns
 
 if TYPE_CHECKING:
+    from ..errors import Place
     from ..grid.certificate import Certificate
     from ..grid.grid import Grid
     from ..scan.cloud import PointCloud
@@ -127,8 +130,11 @@ class AskedScan:
         return self.by_default and bool(sample_surface(self.cloud, settings).smooth)
 
 
-def runs_along_rods(grid: Grid, cloud: PointCloud, settings: Settings) -> bool:
-    """Whether a grid that passes leaves the boundary of its scan beside rods, as where its edge runs down a column, or misses rods."""
+def runs_along_rods(grid: Grid, cloud: PointCloud, settings: Settings, asked: Settings) -> bool:
+    """Whether a grid that passes leaves the boundary of its scan beside rods, as where its edge runs down a column, or misses rods.
+
+    Where what was asked for cuts limbs off, rods are limbs too, and count as missing.
+    """
     found = grid.certificate
     if not settings.keep_rods or settings.method != "default" or found is None:
         return False
@@ -139,13 +145,28 @@ def runs_along_rods(grid: Grid, cloud: PointCloud, settings: Settings) -> bool:
         for place in (warning.where, *warning.also)
         if place is not None
     ]
-    if not places:
+    if not places or sample_surface(cloud, asked).rings:
         return False
     samples = sample_surface(cloud, settings.replace(keep_rods=False))
     rods = samples.scan[samples.judged == ROD] + samples.origin
     return bool(len(rods)) and any(
         bool((np.linalg.norm(rods - place, axis=1) < BESIDE_RODS * settings.length).any()) for place in places
     )
+
+
+def breaks_limb(grid: Grid, cloud: PointCloud, asked: Settings, settings: Settings) -> Place | None:
+    """Return a place where a grid of other settings than were asked for misses a part of a limb; None where there is none.
+
+    What is asked for cuts that limb off at a clean ring, or at two.
+    """
+    cut = sample_surface(cloud, asked)
+    if not cut.rings or settings == asked:
+        return None
+    samples = sample_surface(cloud, settings)
+    limb = (cut.judged == LIMB) & (samples.judged == KEPT)
+    if not limb.any():
+        return None
+    return broken_limb(samples, limb, measure_distances(grid, samples, settings.length).scan, settings.length)
 
 
 def stands_on_columns(cloud: PointCloud, settings: Settings) -> bool:
@@ -182,7 +203,10 @@ def _stands_on_rods(cloud: PointCloud, settings: Settings) -> bool:
     cut, without = sample_surface(cloud, settings), sample_surface(cloud, settings.replace(keep_rods=False))
     if not (without.judged == ROD).any():
         return False
-    parts = [len(each.pieces) + len(each.not_chosen) for each in (cut, without)]
+    whole = cut
+    if cut.rings and without.floor is not None:  # columns that were cut off as limbs joined the floor all the same
+        whole = sample_surface(cloud, settings.replace(limb_girth=0.0))
+    parts = [len(each.pieces) + len(each.not_chosen) for each in (whole, without)]
     if parts[1] > parts[0] or (cut.rough > VERY_ROUGH_SCAN and without.rough <= ROUGH_SCAN):
         return True
     if stands_on_columns(cloud, settings):

@@ -9,11 +9,12 @@ import numpy as np
 from ..grid.certificate import Fault, place_of
 from ..kernels.geometry.components import component_labels
 from ..kernels.mesh.sheets import first_disconnected, nearest_nodes
-from ..surface.chosen_samples import LIMB
+from ..surface.chosen_samples import KEPT, LIMB
 from ..surface.scratch import with_own_scratch
 from .left_out import LIMBS_APART, points_together
 
 if TYPE_CHECKING:
+    from ..errors import Place
     from ..grid.grid import Grid
     from ..surface.samples import SurfaceSamples
     from .distances import Distances
@@ -23,6 +24,11 @@ FARTHEST_COVERED = 1.2
 LEFT_OUT = 0.2  # share of the sheets that a grid may leave out
 MEMBERS_APART_TORN = 4  # members between two nodes from which on neighbouring parts of the scan are torn apart
 FEWEST_LINKS = 3  # fewest links between such parts that are no accident
+BESIDE_BREAK = (
+    0.25  # gap between points of one side of a break, and distance from it of those beside it [member lengths]
+)
+SPACINGS_BESIDE_BREAK = 1.5  # ... and in spacings of the points
+FEWEST_BESIDE_BREAK = 6  # fewest points of a side of a break
 
 
 def nodes_of_samples(grid: Grid, samples: SurfaceSamples, length: float) -> np.ndarray:
@@ -66,6 +72,35 @@ def cut_apart(grid: Grid, samples: SurfaceSamples, found: Distances, length: flo
     smallest = joined[sizes[joined].argmin()]
     words = f"is in {len(joined)} pieces: what joins them is too thin for the members and was cut off"
     return [Fault("apart", words, place_of(grid.nodes[node_piece == smallest].mean(axis=0) + grid.origin))]
+
+
+def broken_limb(samples: SurfaceSamples, limb: np.ndarray, distance: np.ndarray, length: float) -> Place | None:
+    """Return a place where a grid follows a limb on both sides of a part that it misses by more than a member; None where there is none.
+
+    Parameters
+    ----------
+    limb : (N,) bool, the points of limbs that the grid is to follow
+    distance : (N,) of each point from the grid [scan unit]
+    """
+    from scipy.spatial import cKDTree
+
+    gone = np.flatnonzero(limb & (distance > 0.5 * length))
+    if not (distance[gone] > length).any():
+        return None
+    apart = max(BESIDE_BREAK * length, SPACINGS_BESIDE_BREAK * samples.spacing)
+    followed = np.flatnonzero((samples.judged == KEPT) & (distance <= 0.5 * length))
+    group = points_together(samples.scan[gone], np.full(len(gone), apart))
+    for each in np.unique(group[distance[gone] > length]):
+        part = samples.scan[gone[group == each]]
+        away, _ = cKDTree(part).query(samples.scan[followed], distance_upper_bound=2.0 * apart)
+        beside = samples.scan[followed[np.isfinite(away)]]
+        if not len(beside):
+            continue
+        sides = np.bincount(points_together(beside, np.full(len(beside), apart)))
+        if (sides >= FEWEST_BESIDE_BREAK).sum() > 1:
+            middle = part[((part - part.mean(axis=0)) ** 2).sum(axis=1).argmin()]
+            return place_of(middle + samples.origin)
+    return None
 
 
 def disconnected_place(grid: Grid, samples: SurfaceSamples, nearest: np.ndarray) -> np.ndarray | None:

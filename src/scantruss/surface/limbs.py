@@ -12,16 +12,22 @@ from ..kernels.geometry.components import component_labels
 from ..kernels.scan.nearby import nearest_places
 from ..kernels.surface.girths import mark_opposite, measure_girths
 from ..kernels.surface.local_surface import Surface, flood
+from ..kernels.surface.rods import spreads_around
 from ..runtime.parallel import in_parts, run_in_parts
 from .faced_surface import faced_surface
 from .given_normals import GivenNormals
 from .linked_samples import link_samples
 from .pieces import LEAST_TRIANGLES, TRIANGLE_AREA, sample_areas
+from .rods import line_like
 from .scratch import with_own_scratch
 
 # distance from a sample within which one faces the opposite way on a limb too thin [desired lengths]
 SUSPECT_WITHIN = 1.1
+FEWEST_ALONG_LINE = 5  # fewest samples that show that others lie along a line
 FINE_SAMPLES = 0.1  # radius of the samples by which girths are measured [member lengths]
+LEAST_TURNED_BACK = (
+    0.5  # share of the tubes that face inwards that do so by samples half as wide too, if these are taken
+)
 HALF_SECTION = 0.15  # half the thickness of a section [desired lengths]
 LARGEST_GIRTH = 1.2  # largest girth that is measured [girth below which limbs are cut off]
 PASSES_OF_MAJORITY = 3  # passes in which a sample becomes what most of those linked to it are
@@ -57,6 +63,7 @@ def cut_limbs(
     surface: Surface,
     boxes: SearchBoxes,
     given: GivenNormals | None = None,
+    smooth: bool = False,
 ) -> tuple[np.ndarray, tuple[LimbRing, ...]]:
     """Return which points (N, 3) lie on limbs thinner than a girth, (N,) bool, and the rings at which these are cut off.
 
@@ -68,9 +75,11 @@ def cut_limbs(
         The samples of the points.
     given : GivenNormals, optional
         Normals that came with the scan.
+    smooth : bool
+        Whether the scan bends evenly everywhere, so that the normals of its samples can be trusted.
     """
     none: tuple[np.ndarray, tuple[LimbRing, ...]] = np.zeros(len(points), np.bool_), ()
-    suspect = _suspects(surface, boxes, girth)
+    suspect = _suspects(surface, boxes, girth, smooth)
     if suspect.sum() < FEWEST_OF_LIMB:
         return none
     owner = np.empty(len(points), np.int64)
@@ -87,16 +96,27 @@ def cut_limbs(
     return none[0], rings
 
 
-def _suspects(surface: Surface, boxes: SearchBoxes, girth: float) -> np.ndarray:
+def _suspects(surface: Surface, boxes: SearchBoxes, girth: float, smooth: bool) -> np.ndarray:
     """Return which samples may lie on a limb too thin (S,) bool, and those around them."""
     marks = np.zeros(len(surface.mean), np.bool_)
     run_in_parts(len(marks), LIMBS_PER_THREAD, mark_opposite, surface, boxes, SUSPECT_WITHIN * girth / 3.0, marks)
+    if not smooth:
+        marks |= _along_lines(surface, boxes, girth)
     if marks.sum() < FEWEST_OF_LIMB:
         return marks
     beside = surface.neighbors
     for _ in range(int(np.ceil(1.5 * surface.length / (2.0 * surface.radius)))):
         marks = marks | (marks[beside] & (beside >= 0)).any(axis=1)
     return marks
+
+
+def _along_lines(surface: Surface, boxes: SearchBoxes, girth: float) -> np.ndarray:
+    """Return which samples (S,) bool lie along a line: on a limb hardly wider than they are, whose normals tell nothing."""
+    count, middle = np.empty(len(surface.mean), np.int64), np.empty_like(surface.mean)
+    moments = np.empty((len(surface.mean), 3, 3))
+    every = np.ones(len(surface.mean), np.bool_)
+    spreads_around(surface.mean, boxes, every, surface.length * girth / 3.0, moments, middle, count)
+    return line_like(np.linalg.eigvalsh(moments)) & (count >= FEWEST_ALONG_LINE)
 
 
 def _bodies_beside(suspect: np.ndarray, surface: Surface) -> np.ndarray:
@@ -106,6 +126,52 @@ def _bodies_beside(suspect: np.ndarray, surface: Surface) -> np.ndarray:
     beside = np.full(len(suspect), -1)
     beside[at] = body[surface.neighbors[at, linked[at].argmax(axis=1)]]
     return beside
+
+
+@dataclass(frozen=True, eq=False)
+class _Girths:
+    """Fine samples of some points, and the girths of the limbs on which they lie."""
+
+    surface: Surface
+    owner: np.ndarray  #: (N,) fine sample of each point
+    of_scan: np.ndarray  #: (S,) sample of the scan that each belongs to
+    girth: np.ndarray  #: (S,) [desired lengths]
+    axis: np.ndarray  #: (S, 3) of the limb at each sample
+    turned: float  #: share of them around which a tube so thin faces inwards, as in a hole
+
+    @classmethod
+    def of(
+        cls,
+        points: np.ndarray,
+        coarse: np.ndarray,
+        radius: float,
+        spacing: float,
+        limit: float,
+        scan: Surface,
+        given: GivenNormals | None,
+    ) -> _Girths:
+        """Return those of samples of some radius; other parameters as of `_Parts.of`."""
+        found = link_samples(points, radius, scan.length, spacing, given)
+        surface, piece, _ = faced_surface(found, radius, scan.length, spacing)
+        of_scan = coarse[found.chosen]
+        surface = surface._replace(field=np.ascontiguousarray(scan.field[of_scan]))
+        agree = np.bincount(piece, np.einsum("si,si->s", surface.normals, scan.normals[of_scan]))
+        surface.normals[agree[piece] < 0.0] *= -1.0
+        girth, axis = _girths(surface, limit)
+        inwards, _ = _girths(surface._replace(normals=-surface.normals), limit)
+        return cls(surface, found.owner, of_scan, girth, axis, float((inwards < limit).mean()))
+
+
+def _girths(surface: Surface, limit: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the girth (S,) and the axis (S, 3) of the limb at each sample, up to somewhat beyond a limit [desired lengths]."""
+    girth, axis = np.full(len(surface.mean), np.inf), np.zeros((len(surface.mean), 3))
+
+    def measure(part: int, begin: int, end: int) -> None:
+        own = surface if part == 0 else with_own_scratch(surface)
+        measure_girths(own, LARGEST_GIRTH * limit, HALF_SECTION, girth, axis, begin, end)
+
+    in_parts(len(girth), LIMBS_PER_THREAD, measure)
+    return girth / (surface.length * surface.field), axis
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,21 +202,15 @@ class _Parts:
     ) -> _Parts | None:
         """Return the parts of points (N, 3) of samples of the scan (N,), beside its other parts (T,); None where none is thin."""
         length = scan.length
-        radius = max(FINE_SAMPLES * length, 0.25 * spacing)
-        found = link_samples(points, radius, length, spacing, given)
-        surface, piece, _ = faced_surface(found, radius, length, spacing)
-        of_scan = coarse[found.chosen]
-        surface = surface._replace(field=np.ascontiguousarray(scan.field[of_scan]))
-        agree = np.bincount(piece, np.einsum("si,si->s", surface.normals, scan.normals[of_scan]))
-        surface.normals[agree[piece] < 0.0] *= -1.0
-        girth, axis = np.full(len(piece), np.inf), np.zeros((len(piece), 3))
-
-        def measure(part: int, begin: int, end: int) -> None:
-            own = surface if part == 0 else with_own_scratch(surface)
-            measure_girths(own, LARGEST_GIRTH * limit, HALF_SECTION, girth, axis, begin, end)
-
-        in_parts(len(piece), LIMBS_PER_THREAD, measure)
-        girth /= length * surface.field
+        fine = _Girths.of(points, coarse, max(FINE_SAMPLES * length, 0.25 * spacing), spacing, limit, scan, given)
+        if (
+            fine.turned * len(fine.girth) >= FEWEST_OF_LIMB
+        ):  # holes, or limbs turned inside out at an acute angle with the body
+            finer = _Girths.of(
+                points, coarse, max(0.5 * FINE_SAMPLES * length, 0.25 * spacing), spacing, limit, scan, given
+            )
+            fine = finer if finer.turned < LEAST_TURNED_BACK * fine.turned else fine
+        surface, owner, of_scan, girth, axis = fine.surface, fine.owner, fine.of_scan, fine.girth, fine.axis
         thin = _smoothed(girth < limit, surface.neighbors)
         if thin.sum() < FEWEST_OF_LIMB:
             return None
@@ -169,7 +229,7 @@ class _Parts:
         total = np.bincount(label, area, len(label))
         at_boundary = np.bincount(label, body >= 0, len(label)) > 0
         solid = ~thin & (at_boundary | (total >= LEAST_TRIANGLES * TRIANGLE_AREA))[label]
-        return cls(points, found.owner, surface, axis, girth, limit, label, thin, solid, body)
+        return cls(points, owner, surface, axis, girth, limit, label, thin, solid, body)
 
     def cut(self) -> tuple[np.ndarray, tuple[LimbRing, ...]]:
         """Return which points (N,) bool are cut off, and the rings."""

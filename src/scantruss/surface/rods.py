@@ -69,14 +69,14 @@ def rod_points(found: Linked, points: int, length: float, supports: np.ndarray |
     known = np.zeros(len(found.mean), np.bool_) if supports is None else supports
     spreads, _, count = _spreads(found, np.ones(len(found.mean), np.bool_), COARSE_REACH * length)
     tells = np.median(count) >= FEWEST_SAMPLES_AROUND  # of fewer samples around each a sheet may look thin too
-    rod = known | (_thin(spreads) & tells)
+    rod = known | (line_like(spreads) & tells)
     along_line = rod.copy()
     if rod.any():  # then joints of a scaffold too, which are rods to all sides
-        rod |= _thin(_spreads(found, ~rod, FINE_REACH * length)[0])
+        rod |= line_like(_spreads(found, ~rod, FINE_REACH * length)[0])
     for _ in range(END_ROUNDS if rod.any() else 0):
         near = ~rod & (_moments(found, rod, END_REACH * length)[2] > 0)
         spreads, off, count = _spreads(found, ~rod, COARSE_REACH * length)
-        alone = (count < SAMPLES_OF_SHEET) | _thin(spreads)
+        alone = (count < SAMPLES_OF_SHEET) | line_like(spreads)
         ends = near & (alone | (off > np.maximum(END_OFFSET * length, 2.0 * np.sqrt(spreads[:, 0]))))
         if not ends.any():
             break
@@ -186,7 +186,7 @@ def _widens(points: np.ndarray, ends: np.ndarray, beyond: np.ndarray) -> bool:
     if len(points) < PARTS_OF_FOOT * SAMPLES_OF_SHEET:
         return False
     variances, axes = np.linalg.eigh(np.cov(points - middle, rowvar=False))
-    if not _thin(variances[None])[0]:
+    if not line_like(variances[None])[0]:
         return False
     all_points = np.concatenate([points, beyond]) - middle
     across = all_points @ axes[:, :2]
@@ -287,7 +287,7 @@ def _behind_sheets(found: Linked, rod: np.ndarray, length: float) -> np.ndarray:
         at = (found.mean - middle) @ axes[:, 2]
         away = np.linalg.norm(found.mean - middle - at[:, None] * axes[:, 2], axis=1)
         width = float(np.median(away[own]))  # of most of it, without what was taken of a sheet where it ends
-        if not _thin(variances[None])[0] or width > WIDEST_ROD * length:  # several, as the frames of a scaffold
+        if not line_like(variances[None])[0] or width > WIDEST_ROD * length:  # several, as the frames of a scaffold
             continue
         near = away <= BEHIND_WIDTH * width + TILT_OF_AXIS * np.abs(at)
         along_axes.append(~rod & near & (np.abs(at) < np.abs(at[own]).max() + 2.0 * float(np.ptp(at[own]))))
@@ -302,7 +302,7 @@ def _behind_sheets(found: Linked, rod: np.ndarray, length: float) -> np.ndarray:
     return goes_on
 
 
-def _thin(spreads: np.ndarray) -> np.ndarray:
+def line_like(spreads: np.ndarray) -> np.ndarray:
     """Return where samples lie along a line, (S,) bool."""
     thin: np.ndarray = spreads[:, 1] < THIN_VARIANCE * spreads[:, 2]
     return thin
