@@ -51,6 +51,19 @@ def test_a_sheet_that_faces_down_hangs_and_is_not_turned_over(axis: int) -> None
     assert guessed_up(turned_over(grid)) == ""
 
 
+@pytest.mark.parametrize("turn", [0.0, 30.0, 90.0, 180.0])
+def test_a_facade_stands_whichever_way_it_faces(turn: float) -> None:
+    """A wall with windows set back, 20 wide and 12 high in a file with z up and without a unit, was drawn lying."""
+    x, z = (axis.ravel() for axis in np.meshgrid(np.linspace(0.0, 20.0, 41), np.linspace(0.0, 12.0, 31)))
+    nodes = np.column_stack([x, np.where((x % 4 > 1) & (x % 4 < 3) & (z % 3 > 1), 0.4, 0.0), z])
+    number = np.arange(len(x)).reshape(31, 41)
+    a, b, c, d = (part.ravel() for part in (number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]))
+    triangles = np.concatenate([np.column_stack([a, b, c]), np.column_stack([a, c, d])])
+    cos, sin = np.cos(np.radians(turn)), np.sin(np.radians(turn))
+    turned = dome(unit="").replace(nodes=nodes @ [[cos, sin, 0], [-sin, cos, 0], [0, 0, 1]], triangles=triangles)
+    assert guessed_up(turned) == ""
+
+
 def test_a_level_floor_under_a_grid_tells_that_z_is_up() -> None:
     body = icosahedron()
     body = body.replace(nodes=body.nodes * [1.0, 2.0, 1.0])

@@ -330,3 +330,28 @@ def test_what_is_too_far_apart_for_short_members_is_no_outlier() -> None:
     assert clean_points(points, smooth=False, normals=False).steps[2].count == 0
     samples = sample_surface(st.PointCloud.from_array(points), st.Settings(length=0.2))
     assert samples.outliers == 0 and (samples.judged == SPARSE_POINT).sum() > 1000
+
+
+def toes(noise: float) -> tuple[np.ndarray, np.ndarray]:
+    """Points of a plate with rows of blunt toes on it, one a unit of area; and which are of toes."""
+    rng, radius, long = np.random.default_rng(0), 1.2, 3.0
+    plate, parts = np.column_stack([rng.random((8100, 2)) * 90.0, np.zeros(8100)]), []
+    for x in np.linspace(10.0, 80.0, 5):
+        for y in 45.0 + 2.4 * np.arange(-2, 3):
+            plate = plate[np.hypot(plate[:, 0] - x, plate[:, 1] - y) > radius]
+            turn, height = rng.random((2, int(2 * np.pi * radius * (long + radius)))) * [[2 * np.pi], [long + radius]]
+            away = np.sqrt(np.maximum(radius**2 - np.maximum(height - long, 0.0) ** 2, 0.0))
+            parts.append(np.column_stack([x + away * np.cos(turn), y + away * np.sin(turn), height]))
+    points = np.concatenate([plate, *parts])
+    return points + rng.normal(0.0, noise, points.shape), np.arange(len(points)) >= len(plate)
+
+
+@pytest.mark.parametrize("noise", [0.1, 0.3])
+def test_blunt_small_parts_and_the_ends_of_noise_are_no_outliers(noise: float) -> None:
+    """More than half of the toes was taken for clouds, and of the plate one point in three hundred."""
+    points, is_toe = toes(noise)
+    strays = np.array([[5.0, 5.0, 6.0], [60.0, 20.0, 9.0], [60.0, 20.5, 9.0], [82.0, 80.0, -4.0]])
+    outlier = outliers.find_outliers(np.concatenate([points, strays]), 3.0)
+    assert outlier[-len(strays) :].all()
+    assert outlier[: len(points)][is_toe].mean() < 0.01
+    assert outlier[: len(points)][~is_toe].mean() < 0.0015

@@ -18,7 +18,7 @@ from scantruss.check.boundaries import boundary_beyond, boundary_left, places_as
 from scantruss.check.certify import certify, passed_grid
 from scantruss.check.distances import measure_distances
 from scantruss.check.doubtful import doubtful_places, zigzags
-from scantruss.check.gaps import bridged_gaps
+from scantruss.check.gaps import bridged_gaps, by_x, is_empty_within
 from scantruss.check.limits import places_to_look_at
 from scantruss.check.openings import boundary_overrun
 from scantruss.errors import CertificateError
@@ -473,3 +473,17 @@ def test_a_corner_where_no_scan_is_cannot_be_cut_off() -> None:
             Any, type("Scan", (), known_of_scan)()
         )  # unlike a namespace something that boxes can be kept for
         assert bool(places_aside(grid, guessed, 1.0, samples)) == said
+
+
+def test_an_empty_place_in_a_sparse_part_is_no_opening() -> None:
+    """A disc of radius 1 without points: all around dense ones, or on one half hardly any, or there the boundary of the scan."""
+    rng = np.random.default_rng(0)
+    points = np.column_stack([rng.uniform(-5.0, 5.0, (4000, 2)), np.zeros(4000)])
+    points = by_x(points[np.hypot(*points[:, :2].T) > 1.0])
+    sparse = points[(points[:, 0] < 0.0) | (np.arange(len(points)) % 30 == 0)]
+    turn = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
+    curve = 1.05 * np.column_stack([np.cos(turn), np.sin(turn), 0.0 * turn])
+    nowhere = np.zeros((0, 3))
+    assert is_empty_within(curve, points, nowhere) and is_empty_within(curve, sparse)
+    assert not is_empty_within(curve, sparse, nowhere)
+    assert is_empty_within(curve, sparse, np.array([[1.2, 0.0, 0.0]]))

@@ -34,6 +34,9 @@ SOME_PLACES = 50  # places from which the usual distance is taken
 POINTS_AROUND = 45  # points up to twice that distance from which on an empty place is no accident, as exp(-n/3) tells
 # ... where the emptiest of many places is chosen, which is farther from points than one at random
 POINTS_AROUND_MIDDLE = 60
+# sectors of the ring around an empty place, and least number of points in the two that have fewest: where these tell the density, the place
+# is empty at random with a probability of exp(-7)
+SECTORS_OF_RING, LEAST_OF_TWO = 6, 7
 PLACES_ACROSS_GAP = np.stack(np.meshgrid(*[np.linspace(-0.6, 0.6, 7)] * 2), axis=-1).reshape(
     -1, 2
 )  # places around another [reach]
@@ -92,6 +95,10 @@ def _gaps_within(
     far = np.flatnonzero(away > least)
     far = far[np.argsort(-away[far], kind="stable")[:GAPS_LOOKED_AT]]
     half = np.array([empty_disc(places[at], normals[owner[at]], away[at], points, needed[at]) for at in far])
+    rim = points_of_loops(boundary)
+    half *= [
+        not is_sparse_beside(places[at], normals[owner[at]], r, points, rim) for at, r in zip(far, half, strict=True)
+    ]
     far, half = far[half > least[far]], half[half > least[far]]
     if not len(far):
         return [], []
@@ -163,14 +170,39 @@ def by_x(points: np.ndarray) -> np.ndarray:
     return ordered
 
 
-def is_empty_within(curve: np.ndarray, points: np.ndarray) -> bool:
-    """Whether a closed curve (M, 3) is around a place that is no accident to be empty; points : (N, 3) by ascending x."""
+def is_empty_within(curve: np.ndarray, points: np.ndarray, rim: np.ndarray | None = None) -> bool:
+    """Whether a closed curve (M, 3) is around a place that is no accident to be empty.
+
+    points : (N, 3) by ascending x; rim : as of `is_sparse_beside`, which is asked too where it is given.
+    """
     middle = curve.mean(axis=0)
     normal = np.linalg.svd(curve - middle)[2][2]
     reach = float(np.linalg.norm(curve - middle, axis=1).max())
     place = _emptiest(middle, normal, reach, points)  # a curve of few samples is not around the middle of its hole
     away = float(np.linalg.norm(points_within(place, reach, points) - place, axis=1).min(initial=reach))
-    return empty_disc(place, normal, away, points) > 0.0
+    radius = empty_disc(place, normal, away, points)
+    return radius > 0.0 and (rim is None or not is_sparse_beside(place, normal, radius, points, rim))
+
+
+def points_of_loops(boundary: Boundary) -> np.ndarray:
+    """Return the points of all loops of a boundary (B, 3)."""
+    return np.concatenate([np.zeros((0, 3)), *(loop.points for loop in boundary.loops)])
+
+
+def is_sparse_beside(place: np.ndarray, normal: np.ndarray, radius: float, points: np.ndarray, rim: np.ndarray) -> bool:
+    """Whether points are so few on one side of an empty disc that it may belong to a sparse part of the scan, and is no opening.
+
+    points : (N, 3) by ascending x; rim : (B, 3) boundary of the scan, near which no side is looked at.
+    """
+    if radius <= 0.0 or bool((((rim - place) ** 2).sum(axis=1) < (2.0 * radius) ** 2).any()):
+        return False
+    around = points_within(place, 3.0 * radius, points) - place
+    x, y = np.linalg.svd(normal[None])[2][1:]
+    u, v, height = around @ x, around @ y, around @ normal
+    in_ring = (np.abs(height) <= 2.0 * radius) & (np.hypot(u, v) <= 2.0 * radius)
+    sector = ((np.arctan2(v, u) / (2.0 * np.pi) + 0.5) * SECTORS_OF_RING).astype(int) % SECTORS_OF_RING
+    count = np.sort(np.bincount(sector[in_ring], minlength=SECTORS_OF_RING))
+    return bool(count[:2].sum() < LEAST_OF_TWO)
 
 
 def points_within(place: np.ndarray, reach: float, points: np.ndarray) -> np.ndarray:

@@ -14,7 +14,7 @@ from ..kernels.mesh.coverage import nearest_distances
 from ..surface.chosen_samples import DUPLICATE, KEPT, LIMB, OUTLIER, ROD, SLIT, SPARSE_POINT
 from ..surface.owners import owners_of
 from .distances import boxes_of
-from .gaps import by_x, is_empty_within
+from .gaps import by_x, is_empty_within, points_of_loops
 
 if TYPE_CHECKING:
     from ..boundary.find import Boundary
@@ -177,7 +177,7 @@ def closed_holes(samples: SurfaceSamples, boundary: Boundary) -> list[LeftOut]:
     """Return the holes that were closed, the largest first and further ones as one.
 
     They were filled with made-up points, or were so small that the front ran over them. Of the latter, places between sparse points
-    are left out that are empty by accident.
+    are left out that are empty by accident, and those in sparse parts.
     """
     made_up = np.arange(samples.measured, len(samples.surface.mean))
     group = _groups(samples, made_up)
@@ -185,7 +185,8 @@ def closed_holes(samples: SurfaceSamples, boundary: Boundary) -> list[LeftOut]:
     filled = [places for places in filled if not _closes_body(places, samples)]
     holes = [_hole(places, samples, asked=True) for places in filled]
     points = by_x(samples.measured_points) if boundary.bridged else samples.measured_points
-    holes += [_hole(curve, samples, asked=False) for curve in boundary.bridged if is_empty_within(curve, points)]
+    rim = points_of_loops(boundary)
+    holes += [_hole(curve, samples, asked=False) for curve in boundary.bridged if is_empty_within(curve, points, rim)]
     holes = without_caps(holes, samples)
     return first_and_more(sorted(holes, key=lambda hole: -(hole.size or 0.0)))
 

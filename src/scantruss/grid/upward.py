@@ -16,6 +16,13 @@ if TYPE_CHECKING:
 AGAINST_GRAVITY = np.array([0.0, 0.0, 1.0])
 OPEN_SHELL = 0.5  # length of the mean normal by area above which a shell is open: it faces one way on the whole
 LEAST_FACING = 0.08  # length of the mean normal by area above which it decides which way is up if no flat face does
+ALONG_AXIS = math.cos(
+    math.radians(25.0)
+)  # part of the direction that such a shell faces along an axis above which it is that axis
+LEVEL_FACING = (
+    0.5  # upward part of the direction that such a shell faces, below which it stands if z is up: as a facade
+)
+LEAST_RISE = 0.12  # depth of a shell along the axis that it faces above which that axis is up [longest side]
 FACE_DEPTH = 0.02  # how flat the face is on which something stands [longest side]
 FLAT_FACE = 0.1  # least share of such a face in the plan
 LOWER_FACE_WEIGHT = 3.0  # how much more a face counts that is below in a file with y or z up
@@ -64,12 +71,13 @@ def facing_of(nodes: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 def likely_upward(nodes: np.ndarray, facing: np.ndarray) -> np.ndarray:
     """Return the direction that is probably up (3,), where gravity is not known: an object lies on its largest flat face.
 
-    An open shell lies across the way it faces, with y or z of its file upwards: a net between masts and a bowl face down. An object
+    An open shell lies across the way it faces, with y or z of its file upwards: a net between masts and a bowl face down. But one that
+    faces a side stands, as a facade, unless it faces along an axis and rises as a dome does. An object
     without a flat face stands along its longest side, or lies if it is flat.
     """
     openness = float(np.linalg.norm(facing))
     if openness > OPEN_SHELL:
-        return _upward(facing / openness)
+        return AGAINST_GRAVITY.copy() if _is_facade(nodes, facing / openness) else _upward(facing / openness)
     extent = np.ptp(nodes, axis=0)
     faces = {}
     for axis in range(3):
@@ -84,6 +92,13 @@ def likely_upward(nodes: np.ndarray, facing: np.ndarray) -> np.ndarray:
     if share > FLAT_FACE:
         return sign * np.eye(3)[axis]
     return _upward(facing / openness) if openness > LEAST_FACING else _standing(extent)
+
+
+def _is_facade(nodes: np.ndarray, facing: np.ndarray) -> bool:
+    """Whether an open shell that faces some way (3,) stands if z is up, and is no shell that lies with another axis up."""
+    extent, axis = np.ptp(nodes, axis=0), int(np.abs(facing).argmax())
+    lies = abs(facing[axis]) > ALONG_AXIS and extent[axis] >= LEAST_RISE * extent.max()
+    return bool(abs(facing[2]) < LEVEL_FACING and not lies)
 
 
 def _area_around(flat: np.ndarray) -> float:
@@ -101,7 +116,7 @@ def _upward(facing: np.ndarray) -> np.ndarray:
     """Return the direction itself, or the axis it is nearly along; the other way round if it is along -y or -z, which no file has up."""
     axis = int(np.argmax(np.abs(facing)))
     facing = -facing if axis in (1, 2) and facing[axis] < 0.0 else facing
-    return np.eye(3)[axis] * np.sign(facing[axis]) if abs(facing[axis]) > math.cos(math.radians(25)) else facing
+    return np.eye(3)[axis] * np.sign(facing[axis]) if abs(facing[axis]) > ALONG_AXIS else facing
 
 
 def _standing(extent: np.ndarray) -> np.ndarray:

@@ -24,15 +24,21 @@ CLOUD_REACH = 2.5  # reach, over the upper quartile of all, above which a point 
 MOST_OF_CLOUDS = 0.1  # share of points without a surface above which they are no cloud of outliers but the scan itself
 CLOUD_SHARE = 0.18  # share of the spread across the plane above which points are a cloud and no crease
 CLOUD_STEPS = 3  # steps from neighbour to neighbour by which a cloud extends beyond its interior
+# power with which the number of points around a place grows with the distance, below which a part is a surface: 2 there, 3 in clouds
+POWER_OF_SURFACE = 2.5
 CLOUD_NEIGHBORS = 4  # neighbours in a cloud with which a point is examined together with it
 DOUBT_DISTANCE = 2.0  # distance from the plane of its neighbours, in their thickness, above which a point is examined
 FARTHEST_APART = 1.1  # reach above which points are too far apart for a grid [member lengths]
 # distance to the third neighbour, in reaches of those around and of `distance`, at which a point is an outlier
 LONE_DISTANCE = 0.5
+# distance of such a point from the mean of its neighbours, in that of the last, up to which it has them on all sides
+AMONG_OTHERS = 0.5
+THIN_AROUND = 0.14  # thickness of these neighbours, in radii, up to which they are a surface on which the point may lie
 # rank, from the smallest and counted from 0, of the reach around a point that others are compared with
 DENSEST_AROUND = 4
 POINTS_OF_PATCH = 28  # points of the surface from which the distance of a point is measured
 STANDS_OFF = 5.0  # distance from that surface, in multiples of the expected one, above which a point is off it
+WIDER_PATCH = 2  # times as many points as tell whether that holds: of few the noise is often underestimated
 LEAST_EXPECTED = 0.01  # least expected distance, in radii of that surface
 SMALLEST_PART = 8  # fewest doubted points that make a part of a sheet
 # share of them at a free edge above which they are a fringe of the scan, unless they are many and compact
@@ -119,12 +125,14 @@ def _judged(points: np.ndarray, distance: float) -> tuple[np.ndarray, np.ndarray
     first_reach = reach.copy()
     usual = float(np.quantile(reach, 0.75))
     limit = FARTHEST_REACH * usual
+    spared = np.zeros(len(points), np.bool_)
     for _ in range(ROUNDS_OF_OUTLIERS):
         thick, aside = _planes(near, which)
-        outlier = _stand_alone(near, which, reach, distance, limit)
+        outlier, in_gap = _stand_alone(near, which, reach, distance, limit, thick)
         outlier |= (thick > kernels.THICK_CLOUD) & (reach[which] > CLOUD_REACH * usual)
-        outlier |= _stand_off(near, alive, which, ~outlier & (aside > DOUBT_DISTANCE))
+        outlier |= _stand_off(near, alive, which, ~outlier & (in_gap | (aside > DOUBT_DISTANCE)))
         found = which[outlier]
+        spared[which[in_gap & ~outlier]] = True
         if not len(found):
             break
         alive[found] = False
@@ -145,12 +153,14 @@ def _judged(points: np.ndarray, distance: float) -> tuple[np.ndarray, np.ndarray
             found = which[_stand_off(near, alive, which, _planes(near, which)[1] > 0.5 * DOUBT_DISTANCE)]
         alive[found] = False
     doubted = np.flatnonzero(~alive)
-    alive[doubted[_on_sheets(near, alive, first_reach, doubted)]] = True
+    alive[doubted[_on_sheets(near, alive, spared, first_reach, doubted)]] = True
     return near.in_order(~alive), near.in_order(first_reach)
 
 
-def _on_sheets(near: Nearby, alive: np.ndarray, reach: np.ndarray, doubted: np.ndarray) -> np.ndarray:
-    """Return which of the doubted points (D,) lie on a sheet that they form with each other: a sparse part inside the scan.
+def _on_sheets(
+    near: Nearby, alive: np.ndarray, spared: np.ndarray, reach: np.ndarray, doubted: np.ndarray
+) -> np.ndarray:
+    """Return which of the doubted points (D,) lie on a sheet that they form with each other and those spared: a sparse part in the scan.
 
     A few in one plane may be random, and a sparse fringe beyond the edge of the scan is no part of it; a wide sparse part there is,
     as what lies far from the scanner.
@@ -162,7 +172,7 @@ def _on_sheets(near: Nearby, alive: np.ndarray, reach: np.ndarray, doubted: np.n
         len(doubted),
         SEARCHES_PER_THREAD,
         lambda _, begin, end: kernels.find_sheets(
-            near.tree, alive, number >= 0, reach, doubted, company, at_edge, begin, end
+            near.tree, alive, spared | (number >= 0), reach, doubted, company, at_edge, begin, end
         ),
     )
     on = company[:, 0] >= 0
@@ -204,15 +214,30 @@ def _in_clouds(near: Nearby, alive: np.ndarray, doubted: np.ndarray) -> np.ndarr
     """Return which of the points of clouds, which support each other, lie off the surface around."""
     sure = alive.copy()
     sure[doubted] = False
-    off = np.empty(len(doubted))
-    in_parts(
-        len(doubted),
-        SEARCHES_PER_THREAD,
-        lambda _, begin, end: kernels.stand_off(
-            near.tree, sure, doubted, 2 * POINTS_OF_PATCH, LEAST_EXPECTED, off, begin, end
-        ),
-    )
-    return doubted[off > STANDS_OFF]
+    off = doubted[_distances_off(near, sure, doubted, WIDER_PATCH * POINTS_OF_PATCH) > STANDS_OFF]
+    return off[~_of_small_parts(near, off)]
+
+
+def _of_small_parts(near: Nearby, which: np.ndarray) -> np.ndarray:
+    """Return which of some points (P,) form surfaces with each other that bend within a few spacings, as fingers and ears, and no clouds.
+
+    The number of points within a distance grows with its square on a surface and with its cube in a cloud: the mean logarithm of
+    the ratios of the distances to the last and to each other neighbour is the inverse of that power.
+    """
+    number = np.full(len(near.neighbors), -1)
+    number[which] = np.arange(len(which))
+    beside = np.where(near.neighbors[which] >= 0, number[near.neighbors[which]], -1)
+    one, other = np.nonzero(beside >= 0)
+    part = component_labels(len(which), one, beside[one, other])
+    squares = near.squares[which]
+    known = np.isfinite(squares[:, -1]) & (squares[:, -1] > 0.0)
+    ratio = squares[known, -1:] / np.where(squares[known, :-1] > 0.0, squares[known, :-1], squares[known, -1:])
+    apart = np.maximum((squares[known, :-1] > 0.0).sum(axis=1) - 1, 1)  # without points that coincide
+    inverse = np.zeros(len(which))
+    inverse[known] = 0.5 * np.log(ratio).sum(axis=1) / apart
+    size = np.bincount(part, known, len(which))
+    flat = np.bincount(part, inverse, len(which)) * POWER_OF_SURFACE > size
+    return np.asarray((flat & (size >= SMALLEST_PART))[part])
 
 
 def _planes(near: Nearby, which: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -224,27 +249,39 @@ def _planes(near: Nearby, which: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return thick, aside
 
 
-def _stand_alone(near: Nearby, which: np.ndarray, reach: np.ndarray, distance: float, limit: float) -> np.ndarray:
-    """One round of `find_outliers`, by distances."""
+def _stand_alone(
+    near: Nearby, which: np.ndarray, reach: np.ndarray, distance: float, limit: float, thick: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """One round of `find_outliers`, by distances: outliers, and points in gaps, which are none if they lie on the surface around."""
     neighbors = near.neighbors[which]
     low, middle = np.empty((2, len(which)))
     run_in_parts(len(which), SEARCHES_PER_THREAD, kernels.usual_reaches, neighbors, reach, DENSEST_AROUND, low, middle)
     third = np.sqrt(near.squares[which, 2])
     own = reach[which]
-    return (own > distance * middle) | (own > limit) | (third > LONE_DISTANCE * distance * low)
+    alone, far = third > LONE_DISTANCE * distance * low, (own > distance * middle) | (own > limit)
+    in_gap = np.zeros(len(which), np.bool_)
+    some = np.flatnonzero(alone & ~far & (thick < THIN_AROUND) & (neighbors >= 0).all(axis=1))
+    away = near.tree.points[neighbors[some]].mean(axis=1) - near.tree.points[which[some]]
+    in_gap[some] = np.linalg.norm(away, axis=1) < AMONG_OTHERS * np.sqrt(near.squares[which[some], -1])
+    return far | (alone & ~in_gap), in_gap
 
 
 def _stand_off(near: Nearby, alive: np.ndarray, which: np.ndarray, doubted: np.ndarray) -> np.ndarray:
     """One round of `find_outliers`, by the surface of the points around: which of the doubted points lie off it."""
     outlier = np.zeros(len(which), np.bool_)
-    looked = which[doubted]
+    looked = np.flatnonzero(doubted)
+    looked = looked[_distances_off(near, alive, which[looked], POINTS_OF_PATCH) > STANDS_OFF]
+    off = _distances_off(near, alive, which[looked], WIDER_PATCH * POINTS_OF_PATCH)
+    outlier[looked[(off > STANDS_OFF) | (off == 0.0)]] = True  # 0 where so many points form no surface
+    return outlier
+
+
+def _distances_off(near: Nearby, alive: np.ndarray, looked: np.ndarray, around: int) -> np.ndarray:
+    """Return how far some points (P,) lie off the surface of as many living ones around, in multiples of the expected distance."""
     off = np.empty(len(looked))
     in_parts(
         len(looked),
         SEARCHES_PER_THREAD,
-        lambda _, begin, end: kernels.stand_off(
-            near.tree, alive, looked, POINTS_OF_PATCH, LEAST_EXPECTED, off, begin, end
-        ),
+        lambda _, begin, end: kernels.stand_off(near.tree, alive, looked, around, LEAST_EXPECTED, off, begin, end),
     )
-    outlier[doubted] = off > STANDS_OFF
-    return outlier
+    return off
