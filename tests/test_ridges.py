@@ -1,5 +1,6 @@
 """Sharp ridges of the scan: found where there are some, straight and in place, and nowhere else."""
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -433,3 +434,35 @@ def test_a_ridge_that_curls_up_to_a_tip_ends_in_its_corner() -> None:
     tips = np.array([[x, y, 17.0] for x in (-20.0, 20.0) for y in (-20.0, 20.0)]) - cloud.origin
     away = np.linalg.norm(boundary.loops[0].corners[:, None] - tips, axis=2).min(axis=0)
     assert away.max() < 0.1 * settings.length
+
+
+# half width and height of a square pier of 40 edges, from its foot to its top: plinth, splay, shaft, splay, capital
+PROFILE_OF_PIER = ((6.0, 0.0), (6.0, 4.0), (4.5, 5.5), (4.5, 16.0), (6.0, 18.0), (6.0, 21.0), (0.0, 21.0))
+EDGES_OF_PIER = 308.0  # length of all of them
+
+
+def pier(points_per_area: float = 9.0, noise: float = 0.02) -> np.ndarray:
+    """Points (N, 3) on a pier that is open below."""
+    rng, sides = np.random.default_rng(0), []
+    for (below, low), (above, high) in pairwise(PROFILE_OF_PIER):
+        height = np.hypot(above - below, high - low)
+        up = rng.uniform(0.0, 1.0, int(8.0 * max(below, above) * height * points_per_area))
+        half = below + (above - below) * up
+        across = rng.uniform(-1.0, 1.0, len(up)) * max(below, above)
+        off = noise * rng.normal(size=len(up))
+        out, rise = (high - low) / height, (below - above) / height
+        side = np.column_stack([half + out * off, across, low + (high - low) * up + rise * off])[np.abs(across) <= half]
+        turn = rng.integers(0, 4, len(side)) * (0.5 * np.pi)
+        x, y = (
+            np.cos(turn) * side[:, 0] - np.sin(turn) * side[:, 1],
+            np.sin(turn) * side[:, 0] + np.cos(turn) * side[:, 1],
+        )
+        sides.append(np.column_stack([x, y, side[:, 2]]))
+    return np.concatenate(sides)
+
+
+@compiled_only
+def test_a_body_with_many_edges_is_not_rough() -> None:
+    """After half of its edges twelve places in a row at their corners look folded: from there on blunt and short ones were given up."""
+    found = sum(length_along(ridge.places) for ridge in ridges_of(pier(), 1.4))
+    assert found > 0.6 * EDGES_OF_PIER

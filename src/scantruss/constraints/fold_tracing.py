@@ -58,7 +58,9 @@ LOOK_SPACING = 0.33  # places closer together than this are not looked at twice 
 FOLD_BESIDE, WIDE_FOLD_BESIDE = 0.5, 0.8
 WIDE_LOOK_SPACING = 0.5  # distance between places at which wide folds are looked for [member lengths]
 MOST_SAMPLES = 4000  # most samples from which folds are looked for, the sharpest first
-FALSE_FOLDS_OF_ROUGH = 12  # places in a row that look folded and are no ridge, after which only long ridges count
+# places in a row that look folded and are no ridge, after which only long ridges count: at least, and for each ridge found before, as
+# a body with many edges has many corners
+FALSE_FOLDS_OF_ROUGH, FALSE_FOLDS_PER_RIDGE = 12, 2
 MOST_FALSE_FOLDS = 80  # such places in a row after which the search stops
 # places in a row at which a fold may not be seen and still goes on: beside a corner, a wide one is not for the width of its sides
 MISSED_PLACES, WIDE_MISSED_PLACES = 2, 4
@@ -166,7 +168,7 @@ class Tracer:
                 continue
             fold = self.fold_at(sample, places[k], np.zeros(3))
             misses += 1
-            rough |= misses > FALSE_FOLDS_OF_ROUGH
+            rough |= misses > max(FALSE_FOLDS_OF_ROUGH, FALSE_FOLDS_PER_RIDGE * (len(ridges) - len(known)))
             if misses > MOST_FALSE_FOLDS:
                 break
             if (
