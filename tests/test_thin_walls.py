@@ -1,0 +1,69 @@
+"""Thin walls: the points of their two sides face away from each other, also where one side is dense and the other sparse."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from marks import compiled_only
+from numpy.typing import NDArray
+
+import scantruss as st
+from scantruss.attempts.table import attempts
+from scantruss.surface.samples import sample_surface
+
+RADIUS, WALL, HEIGHT, DEPTH = 6.0, 0.5, 14.0, 5.0  # of a pot, to the middle of its wall; its inside is scanned down to a depth
+
+
+def pot(seed: int = 0) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Points of a pot without a floor, sparse outside and dense inside, with a round lip; and the side that each faces, outwards 1."""
+    rng = np.random.default_rng(seed)
+    outside, inside, lip = 9_000, 9_000, 900
+    turn = 2 * np.pi * rng.random(outside + inside + lip)
+    round_lip = np.pi * rng.random(lip)
+    away = np.concatenate(
+        [np.full(outside, 0.5 * WALL), np.full(inside, -0.5 * WALL), 0.5 * WALL * np.cos(round_lip)]
+    )
+    rise = np.concatenate(
+        [HEIGHT * rng.random(outside), HEIGHT - DEPTH * rng.random(inside), HEIGHT + 0.5 * WALL * np.sin(round_lip)]
+    )
+    points = np.column_stack([(RADIUS + away) * np.cos(turn), (RADIUS + away) * np.sin(turn), rise])
+    return np.asarray(points + rng.normal(0.0, 0.01, points.shape)), np.sign(away)
+
+
+def facing_right(length: float, thin_walls: bool) -> float:
+    """Return the share of the samples of a pot below its lip whose normals face away from its wall."""
+    samples = sample_surface(
+        st.PointCloud.from_array(pot()[0]), st.Settings(length=length, thin_walls=thin_walls)
+    )
+    mean, normals = samples.surface.mean + samples.origin, samples.surface.normals
+    radius = np.linalg.norm(mean[:, :2], axis=1)
+    below = mean[:, 2] < HEIGHT - WALL
+    outwards = (normals[:, :2] * mean[:, :2]).sum(axis=1) / radius * np.sign(radius - RADIUS)
+    right = outwards > 0.0
+    return float(max(right[below].mean(), 1.0 - right[below].mean()))
+
+
+@pytest.mark.parametrize("length", [1.0, 1.4])
+def test_both_sides_of_a_thin_wall_face_away_from_it(length: float) -> None:
+    assert facing_right(length, thin_walls=True) > 0.995
+
+
+def test_without_a_closer_look_they_do_not() -> None:
+    assert facing_right(1.4, thin_walls=False) < 0.95
+
+
+def test_thin_walls_are_tried_where_there_are_some() -> None:
+    found = [attempt.settings.thin_walls for attempt in attempts(st.PointCloud.from_array(pot()[0]), st.Settings(length=1.4))]
+    assert found[:4] == [False, True, True, False]
+    plate = np.random.default_rng(0).random((4_000, 3)) * (12.0, 12.0, 0.02)
+    settings = st.Settings(length=1.0)
+    assert not any(attempt.settings.thin_walls for attempt in attempts(st.PointCloud.from_array(plate), settings))
+
+
+@compiled_only
+def test_a_pot_with_a_wall_of_a_third_of_a_member_gets_a_grid() -> None:
+    grid = st.grid_from_points(pot()[0], st.Settings(length=1.4, effort="quick"))
+    assert grid.certificate is not None and grid.certificate.passed
+    assert (grid.topology.boundary_loops, grid.topology.euler, grid.topology.components) == (2, 0, 1)
+    inner = np.linalg.norm((grid.nodes + grid.origin)[:, :2], axis=1) < RADIUS
+    assert inner.sum() > 50  # it is lined with a grid inside as well
