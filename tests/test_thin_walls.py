@@ -11,7 +11,12 @@ import scantruss as st
 from scantruss.attempts.table import attempts
 from scantruss.surface.samples import sample_surface
 
-RADIUS, WALL, HEIGHT, DEPTH = 6.0, 0.5, 14.0, 5.0  # of a pot, to the middle of its wall; its inside is scanned down to a depth
+RADIUS, WALL, HEIGHT, DEPTH = (
+    6.0,
+    0.5,
+    14.0,
+    5.0,
+)  # of a pot, to the middle of its wall; its inside is scanned down to a depth
 
 
 def pot(seed: int = 0) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -20,9 +25,7 @@ def pot(seed: int = 0) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     outside, inside, lip = 9_000, 9_000, 900
     turn = 2 * np.pi * rng.random(outside + inside + lip)
     round_lip = np.pi * rng.random(lip)
-    away = np.concatenate(
-        [np.full(outside, 0.5 * WALL), np.full(inside, -0.5 * WALL), 0.5 * WALL * np.cos(round_lip)]
-    )
+    away = np.concatenate([np.full(outside, 0.5 * WALL), np.full(inside, -0.5 * WALL), 0.5 * WALL * np.cos(round_lip)])
     rise = np.concatenate(
         [HEIGHT * rng.random(outside), HEIGHT - DEPTH * rng.random(inside), HEIGHT + 0.5 * WALL * np.sin(round_lip)]
     )
@@ -32,9 +35,7 @@ def pot(seed: int = 0) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
 
 def facing_right(length: float, thin_walls: bool) -> float:
     """Return the share of the samples of a pot below its lip whose normals face away from its wall."""
-    samples = sample_surface(
-        st.PointCloud.from_array(pot()[0]), st.Settings(length=length, thin_walls=thin_walls)
-    )
+    samples = sample_surface(st.PointCloud.from_array(pot()[0]), st.Settings(length=length, thin_walls=thin_walls))
     mean, normals = samples.surface.mean + samples.origin, samples.surface.normals
     radius = np.linalg.norm(mean[:, :2], axis=1)
     below = mean[:, 2] < HEIGHT - WALL
@@ -53,7 +54,9 @@ def test_without_a_closer_look_they_do_not() -> None:
 
 
 def test_thin_walls_are_tried_where_there_are_some() -> None:
-    found = [attempt.settings.thin_walls for attempt in attempts(st.PointCloud.from_array(pot()[0]), st.Settings(length=1.4))]
+    found = [
+        attempt.settings.thin_walls for attempt in attempts(st.PointCloud.from_array(pot()[0]), st.Settings(length=1.4))
+    ]
     assert found[:4] == [False, True, True, False]
     plate = np.random.default_rng(0).random((4_000, 3)) * (12.0, 12.0, 0.02)
     settings = st.Settings(length=1.0)

@@ -24,9 +24,8 @@ FARTHEST_COVERED = 1.2
 LEFT_OUT = 0.2  # share of the sheets that a grid may leave out
 MEMBERS_APART_TORN = 4  # members between two nodes from which on neighbouring parts of the scan are torn apart
 FEWEST_LINKS = 3  # fewest links between such parts that are no accident
-BESIDE_BREAK = (
-    0.25  # gap between points of one side of a break, and distance from it of those beside it [member lengths]
-)
+# gap between points of one side of a break, and distance from it of those beside it [member lengths]
+BESIDE_BREAK = 0.25
 SPACINGS_BESIDE_BREAK = 1.5  # ... and in spacings of the points
 FEWEST_BESIDE_BREAK = 6  # fewest points of a side of a break
 

@@ -16,12 +16,10 @@ if TYPE_CHECKING:
 AGAINST_GRAVITY = np.array([0.0, 0.0, 1.0])
 OPEN_SHELL = 0.5  # length of the mean normal by area above which a shell is open: it faces one way on the whole
 LEAST_FACING = 0.08  # length of the mean normal by area above which it decides which way is up if no flat face does
-ALONG_AXIS = math.cos(
-    math.radians(25.0)
-)  # part of the direction that such a shell faces along an axis above which it is that axis
-LEVEL_FACING = (
-    0.5  # upward part of the direction that such a shell faces, below which it stands if z is up: as a facade
-)
+# part of the direction that such a shell faces along an axis above which it is that axis
+ALONG_AXIS = math.cos(math.radians(25.0))
+# upward part of the direction that such a shell faces, below which it stands if z is up: as a facade
+LEVEL_FACING = 0.5
 LEAST_RISE = 0.12  # depth of a shell along the axis that it faces above which that axis is up [longest side]
 FACE_DEPTH = 0.02  # how flat the face is on which something stands [longest side]
 FLAT_FACE = 0.1  # least share of such a face in the plan

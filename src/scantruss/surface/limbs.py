@@ -25,9 +25,8 @@ from .scratch import with_own_scratch
 SUSPECT_WITHIN = 1.1
 FEWEST_ALONG_LINE = 5  # fewest samples that show that others lie along a line
 FINE_SAMPLES = 0.1  # radius of the samples by which girths are measured [member lengths]
-LEAST_TURNED_BACK = (
-    0.5  # share of the tubes that face inwards that do so by samples half as wide too, if these are taken
-)
+# share of the tubes that face inwards that do so by samples half as wide too, if these are taken
+LEAST_TURNED_BACK = 0.5
 HALF_SECTION = 0.15  # half the thickness of a section [desired lengths]
 LARGEST_GIRTH = 1.2  # largest girth that is measured [girth below which limbs are cut off]
 PASSES_OF_MAJORITY = 3  # passes in which a sample becomes what most of those linked to it are
@@ -202,13 +201,11 @@ class _Parts:
     ) -> _Parts | None:
         """Return the parts of points (N, 3) of samples of the scan (N,), beside its other parts (T,); None where none is thin."""
         length = scan.length
-        fine = _Girths.of(points, coarse, max(FINE_SAMPLES * length, 0.25 * spacing), spacing, limit, scan, given)
-        if (
-            fine.turned * len(fine.girth) >= FEWEST_OF_LIMB
-        ):  # holes, or limbs turned inside out at an acute angle with the body
-            finer = _Girths.of(
-                points, coarse, max(0.5 * FINE_SAMPLES * length, 0.25 * spacing), spacing, limit, scan, given
-            )
+        radius, finest = FINE_SAMPLES * length, 0.25 * spacing
+        fine = _Girths.of(points, coarse, max(radius, finest), spacing, limit, scan, given)
+        # tubes that face inwards are holes, or limbs turned inside out at an acute angle with the body
+        if fine.turned * len(fine.girth) >= FEWEST_OF_LIMB:
+            finer = _Girths.of(points, coarse, max(0.5 * radius, finest), spacing, limit, scan, given)
             fine = finer if finer.turned < LEAST_TURNED_BACK * fine.turned else fine
         surface, owner, of_scan, girth, axis = fine.surface, fine.owner, fine.of_scan, fine.girth, fine.axis
         thin = _smoothed(girth < limit, surface.neighbors)
