@@ -14,7 +14,7 @@ from small_clouds import ball, cap, sheet
 import scantruss as st
 from scantruss.attempts.course import RIDGES_GIVEN_UP, WITHOUT_RODS, AttemptCourse
 from scantruss.attempts.limit import MOST_RUNS
-from scantruss.attempts.table import AS_ASKED, ROWS_TRIED, Attempt, attempts
+from scantruss.attempts.table import AS_ASKED, ROWS_TRIED, TURNED_ROWS, Attempt, attempts
 from scantruss.errors import FrontError
 
 NAMES = [row.name for row in ROWS_TRIED]
@@ -83,10 +83,10 @@ def test_a_lattice_turned_is_tried_where_all_grids_begin_from_one() -> None:
     large, small = (st.Settings(length=length) for length in (0.6, 1.2))
     cloud = st.PointCloud.from_array(points)
     for asked, expected in (
-        (large, [40.0]),
-        (large.replace(effort="best"), [40.0]),
+        (large, [*TURNED_ROWS]),
+        (large.replace(effort="best"), [*TURNED_ROWS]),
         (small, []),
-        (large.replace(effort="quick"), [40.0]),
+        (large.replace(effort="quick"), [*TURNED_ROWS]),
     ):
         assert [a.starts[0].turn for a in attempts(cloud, asked) if a.row == "rows turned" and a.starts] == expected
     along = large.replace(rows_along=(0.0, 0.0, 5.0, 1.0, 0.0, 0.0))

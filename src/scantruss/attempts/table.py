@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 AS_ASKED = "as asked"
 # lengths of the fronts without rows, in desired lengths, tried in turn where no other passes
 FRONT_LENGTHS = (1.0, 0.97, 1.04)
-TURNED_ROWS = (40.0,)  # angles of the lattice that are tried instead of the usual one [degree]
+TURNED_ROWS = (40.0, 10.0, 50.0)  # angles of the lattice that are tried instead of the usual one [degree]
 COARSER_SAMPLES = (1.1, 1.2, 1.3)  # distances of the surface samples that are tried instead, in those of the settings
 COARSEST_SAMPLES = 0.5  # largest of them, in desired lengths
 SMOOTHING_SCALES = (
