@@ -13,9 +13,9 @@ from .faced_surface import faced_surface
 from .given_normals import GivenNormals
 from .linked_samples import link_samples
 
-FINE_SPACING = 1.3  # distance between the samples that tell the sides of a wall apart [point spacings]
-FINE_SHARE = 0.07  # least distance between them [member lengths]
-FINE_LENGTH = 5.0  # member length that suits them, by which they are linked [their distance]
+WALL_SPACING = 1.3  # distance between the samples that tell the sides of a wall apart [point spacings]
+WALL_SHARE = 0.07  # least distance between them [member lengths]
+WALL_LENGTH = 5.0  # member length that suits them, by which they are linked [their distance]
 ROUNDS = 2  # times that they are linked and faced: the second time, no link leads through the wall
 VOTING_REACH = 3.0  # distance within which samples agree on their sides [their distance]
 MOST_VOTES = 30  # times that all samples are asked at most
@@ -27,10 +27,10 @@ def normals_of_walls(points: np.ndarray, spacing: float, length: float) -> Given
 
     None where they face both ways all over, so that there are no walls to be told apart.
     """
-    apart, given = max(FINE_SPACING * spacing, FINE_SHARE * length), None
+    apart, given = max(WALL_SPACING * spacing, WALL_SHARE * length), None
     for _ in range(ROUNDS):
-        found = link_samples(points, apart, FINE_LENGTH * apart, spacing, given)
-        surface, _, _ = faced_surface(found, apart, FINE_LENGTH * apart, spacing)
+        found = link_samples(points, apart, WALL_LENGTH * apart, spacing, given)
+        surface, _, _ = faced_surface(found, apart, WALL_LENGTH * apart, spacing)
         mean, normals, reach = surface.mean, surface.normals, VOTING_REACH * apart
         boxes = new_boxes(*bounds_of(mean), reach, len(mean), len(mean))
         put_all(boxes, mean, np.arange(len(mean)))
