@@ -20,7 +20,7 @@ from scantruss.export.drawing.left_out import LEFT_OUT_COLOUR, NO_GRID_COLOUR, O
 from scantruss.export.drawing.legend import FAULT_COLOUR, places_marked, round_bar, scale_bar
 from scantruss.export.drawing.picture import PANELS_SIZE, PICTURE_SIZE, draw_panels, encode_picture
 from scantruss.export.drawing.sheet import PICTURE_OF_SHEET, encode_sheet
-from scantruss.export.drawing.strokes import FIXED_NODE_COLOUR, PAPER_COLOUR
+from scantruss.export.drawing.strokes import FIXED_NODE_COLOUR, PAPER_COLOUR, look
 from scantruss.export.drawing.style import PictureStyle
 from scantruss.export.solid import build_solid
 from scantruss.grid.certificate import Certificate, Fault
@@ -130,6 +130,24 @@ def test_map_depth_equals_looking_at_each_pixel() -> None:
                     best, which = share @ near[t], t
             assert triangle[row, column] == which
             assert nearest[row, column] == pytest.approx(best)
+
+
+def test_the_inside_of_a_thin_wall_is_painted_behind_its_outside() -> None:
+    places = np.array([(x + 0.5 * (y % 2), 0.9 * y, 0.0) for y in range(9) for x in range(9)])
+    first = np.array([9 * y + x for y in range(8) for x in range(8)])
+    sheet = np.concatenate(
+        [np.column_stack([first, first + 1, first + 9]), np.column_stack([first + 1, first + 10, first + 9])]
+    )
+    nodes = np.concatenate(
+        [places, places[:, [1, 0, 2]] + (0.3, 0.2, -0.25)]
+    )  # a wall, its other side meshed another way
+    triangles = np.concatenate([sheet, sheet + len(places)])
+    camera = choose_camera(nodes, triangles, view="40,60").framed(nodes, (10.0, 10.0, 390.0, 390.0))
+    view = look(nodes, triangles, camera, (400, 400))
+    _, painted = map_depth(view.corners / 2, np.repeat(view.key[:, None], 3, axis=1), view.front.shape)
+    seen = view.front >= 0
+    assert seen.sum() > 5000 and not view.outside.all()
+    assert (view.outside[painted[seen]] == view.outside[view.front[seen]]).all()
 
 
 def test_panels_show_scan_grid_and_solid(tmp_path: Path) -> None:

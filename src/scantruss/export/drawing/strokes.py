@@ -11,6 +11,8 @@ from ...grid.grid import Grid
 from ...scan.cloud import PointCloud
 from .camera import Camera, map_depth
 
+# by how much a triangle of which the inside is seen counts as farther back: behind the outside of a thin wall, never through it [sides]
+INSIDE_BEHIND = 0.5
 MOST_POINTS = {True: 40_000, False: 120_000}  #: of the scan that are drawn, over a grid and alone
 PAPER_COLOUR = np.array([0.984, 0.980, 0.969])  # background
 GROUND_COLOUR = np.array([0.925, 0.918, 0.898])  # shadow on the ground
@@ -50,7 +52,7 @@ class CameraView:
 
     camera: Camera
     corners: np.ndarray  #: (T, 3, 2) [pixel]
-    key: np.ndarray  #: (T,) nearness of the middle of each triangle [scan unit]
+    key: np.ndarray  #: (T,) nearness of the middle of each triangle, less where its inside is seen [scan unit]
     light: np.ndarray  #: (T,) how much light each gets, 0 to 1
     outside: np.ndarray  #: (T,) bool, whether its outside is seen
     depth: tuple[float, float]  #: nearness of the farthest and the nearest node [scan unit]
@@ -81,7 +83,9 @@ def look(
     rows, columns = (size[1] // 2, size[0] // 2) if mapped else (0, 0)
     nearest, front = map_depth(corners / 2, depth, (rows, columns))
     span = (float(used.min()), float(used.max()))
-    return CameraView(camera, corners, depth.mean(axis=1), np.clip(light, 0, 1), outside, span, nearest, front)
+    side = float(np.sqrt(((b - a) ** 2).sum(axis=1).mean()))
+    key = depth.mean(axis=1) - np.where(outside, 0.0, INSIDE_BEHIND * side)
+    return CameraView(camera, corners, key, np.clip(light, 0, 1), outside, span, nearest, front)
 
 
 def _unit(vector: np.ndarray) -> np.ndarray:
