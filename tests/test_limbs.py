@@ -265,13 +265,17 @@ def test_girths_of_a_cone_are_those_of_its_circles() -> None:
     surface, _, _ = faced_surface(found, 0.1, 1.0, cloud.spacing)
     count = len(surface.mean)
     girth, axis = np.empty(count), np.zeros((count, 3))
-    measure_girths(surface, 4.0, 0.15, girth, axis, 0, count)
+    measure_girths(surface, np.arange(count), 4.0, 0.15, girth, axis, 0, count)
     x = surface.mean[:, 0] + cloud.origin[0]
     inner = (x > 0.5) & (x < 3.5)
     assert np.isfinite(girth[inner]).mean() > 0.98
     seen = inner & np.isfinite(girth)
     true = 2 * np.pi * np.interp(x[seen], axis_x, radius)
     assert np.abs(girth[seen] / true - 1.0).max() < 0.12 and np.median(np.abs(axis[seen, 0])) > 0.99
+    hole, some = np.full(count, np.nan), np.flatnonzero(seen)[::7]
+    inside = surface._replace(normals=-surface.normals)
+    measure_girths(inside, some, 4.0, 0.15, hole, axis, 0, len(some))
+    assert np.array_equal(hole[some], -girth[some]) and np.isnan(np.delete(hole, some)).all()
 
 
 @pytest.mark.kernels

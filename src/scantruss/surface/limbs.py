@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -127,16 +128,12 @@ def _bodies_beside(suspect: np.ndarray, surface: Surface) -> np.ndarray:
     return beside
 
 
-@dataclass(frozen=True, eq=False)
-class _Girths:
-    """Fine samples of some points, and the girths of the limbs on which they lie."""
+class _FineSamples(NamedTuple):
+    """Fine samples of some points."""
 
     surface: Surface
     owner: np.ndarray  #: (N,) fine sample of each point
-    of_scan: np.ndarray  #: (S,) sample of the scan that each belongs to
-    girth: np.ndarray  #: (S,) [desired lengths]
-    axis: np.ndarray  #: (S, 3) of the limb at each sample
-    turned: float  #: share of them around which a tube so thin faces inwards, as in a hole
+    chosen: np.ndarray  #: (S,) point of each
 
     @classmethod
     def of(
@@ -145,32 +142,38 @@ class _Girths:
         coarse: np.ndarray,
         radius: float,
         spacing: float,
-        limit: float,
         scan: Surface,
         given: GivenNormals | None,
-    ) -> _Girths:
-        """Return those of samples of some radius; other parameters as of `_Parts.of`."""
+    ) -> _FineSamples:
+        """Return those of a radius of points of samples of the scan (N,)."""
         found = link_samples(points, radius, scan.length, spacing, given)
         surface, piece, _ = faced_surface(found, radius, scan.length, spacing)
         of_scan = coarse[found.chosen]
         surface = surface._replace(field=np.ascontiguousarray(scan.field[of_scan]))
         agree = np.bincount(piece, np.einsum("si,si->s", surface.normals, scan.normals[of_scan]))
         surface.normals[agree[piece] < 0.0] *= -1.0
-        girth, axis = _girths(surface, limit)
-        inwards, _ = _girths(surface._replace(normals=-surface.normals), limit)
-        return cls(surface, found.owner, of_scan, girth, axis, float((inwards < limit).mean()))
+        return cls(surface, found.owner, found.chosen)
 
 
-def _girths(surface: Surface, limit: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the girth (S,) and the axis (S, 3) of the limb at each sample, up to somewhat beyond a limit [desired lengths]."""
+def _girths(surface: Surface, limit: float, which: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """Return the girth (S,) and the axis (S, 3) of the limb at all samples or some (K,), up to somewhat beyond a limit [desired lengths].
+
+    A girth is less than 0 where the limb faces inwards.
+    """
     girth, axis = np.full(len(surface.mean), np.inf), np.zeros((len(surface.mean), 3))
+    some = np.arange(len(girth)) if which is None else which
 
     def measure(part: int, begin: int, end: int) -> None:
         own = surface if part == 0 else with_own_scratch(surface)
-        measure_girths(own, LARGEST_GIRTH * limit, HALF_SECTION, girth, axis, begin, end)
+        measure_girths(own, some, LARGEST_GIRTH * limit, HALF_SECTION, girth, axis, begin, end)
 
-    in_parts(len(girth), LIMBS_PER_THREAD, measure)
+    in_parts(len(some), LIMBS_PER_THREAD, measure)
     return girth / (surface.length * surface.field), axis
+
+
+def _faces_inwards(girth: np.ndarray, limit: float) -> np.ndarray:
+    """Return which samples lie on a tube so thin that faces inwards (S,) bool: a hole, or a limb turned inside out."""
+    return np.asarray((girth < 0.0) & (girth > -limit))
 
 
 @dataclass(frozen=True, eq=False)
@@ -202,12 +205,18 @@ class _Parts:
         """Return the parts of points (N, 3) of samples of the scan (N,), beside its other parts (T,); None where none is thin."""
         length = scan.length
         radius, finest = FINE_SAMPLES * length, 0.25 * spacing
-        fine = _Girths.of(points, coarse, max(radius, finest), spacing, limit, scan, given)
-        # tubes that face inwards are holes, or limbs turned inside out at an acute angle with the body
-        if fine.turned * len(fine.girth) >= FEWEST_OF_LIMB:
-            finer = _Girths.of(points, coarse, max(0.5 * radius, finest), spacing, limit, scan, given)
-            fine = finer if finer.turned < LEAST_TURNED_BACK * fine.turned else fine
-        surface, owner, of_scan, girth, axis = fine.surface, fine.owner, fine.of_scan, fine.girth, fine.axis
+        fine = _FineSamples.of(points, coarse, max(radius, finest), spacing, scan, given)
+        girth, axis = _girths(fine.surface, limit)
+        inwards = _faces_inwards(girth, limit)
+        if inwards.sum() >= FEWEST_OF_LIMB:  # holes, or limbs turned inside out at an acute angle with the body
+            finer = _FineSamples.of(points, coarse, max(0.5 * radius, finest), spacing, scan, given)
+            there = np.flatnonzero(inwards[fine.owner[finer.chosen]])
+            again = _faces_inwards(_girths(finer.surface, limit, there)[0][there], limit)
+            if again.mean() < LEAST_TURNED_BACK:
+                fine = finer
+                girth, axis = _girths(fine.surface, limit)
+        girth[girth < 0.0] = np.inf
+        surface, owner, of_scan = fine.surface, fine.owner, coarse[fine.chosen]
         thin = _smoothed(girth < limit, surface.neighbors)
         if thin.sum() < FEWEST_OF_LIMB:
             return None

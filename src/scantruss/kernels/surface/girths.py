@@ -21,9 +21,18 @@ INWARD_COSINE = -0.3
 
 @kernel
 def measure_girths(
-    surface: Surface, most: float, half: float, girth: np.ndarray, axis: np.ndarray, begin: int, end: int
+    surface: Surface,
+    which: np.ndarray,
+    most: float,
+    half: float,
+    girth: np.ndarray,
+    axis: np.ndarray,
+    begin: int,
+    end: int,
 ) -> None:
-    """Fill in the girth (S,) and axis (S, 3) of the limb at each sample from `begin` to `end` - 1; infinity where there is none.
+    """Fill in the girth (S,) and axis (S, 3) of the limb at each sample of `which` (K,) from `begin` to `end` - 1.
+
+    Infinity where there is none, and less than 0 where it faces inwards, as a hole does.
 
     A section holds the samples within `half` of the plane through a sample across the axis, to which normals are as perpendicular as
     they can be. It counts if it is closed, and its links reach no farther than half the largest girth.
@@ -34,15 +43,16 @@ def measure_girths(
         Largest girth that matters, and half the thickness of a section [desired lengths there]
     """
     section = np.empty(len(surface.mean), np.int64)
-    for s in range(begin, end):
+    for i in range(begin, end):
+        s = which[i]
         girth[s] = math.inf
         length = surface.length * surface.field[s]
         place, normal = row(surface.mean, s), row(surface.normals, s)
         count = flood(surface, s, place, most / 3.0 * length)
         opposite = False
         xx = xy = xz = yy = yz = zz = 0.0
-        for i in range(count):
-            n = row(surface.normals, surface.queue[i])
+        for k in range(count):
+            n = row(surface.normals, surface.queue[k])
             opposite = opposite or dot(n, normal) < FACING_OPPOSITE
             xx, xy, xz = xx + n[0] * n[0], xy + n[0] * n[1], xz + n[0] * n[2]
             yy, yz, zz = yy + n[1] * n[1], yz + n[1] * n[2], zz + n[2] * n[2]
@@ -85,7 +95,7 @@ def _flood_section(
 
 @kernel
 def _girth_of(surface: Surface, section: np.ndarray, count: int, a: tuple[float, float, float]) -> float:
-    """Girth of the convex hull of a section; infinity where it is open, or a hole."""
+    """Girth of the convex hull of a section; infinity where it is open, less than 0 where it faces inwards, as a hole."""
     u = across(a)
     v = cross(a, u)
     x = y = nx = ny = 0.0
@@ -98,7 +108,7 @@ def _girth_of(surface: Surface, section: np.ndarray, count: int, a: tuple[float,
         p, n = row(surface.mean, section[i]), row(surface.normals, section[i])
         arm, face = (dot(p, u) - x, dot(p, v) - y, 0.0), (dot(n, u), dot(n, v), 0.0)
         outward += dot(arm, face) / max(norm(arm) * norm(face), 1e-300) / count
-    if nx * nx + ny * ny > MOST_MEAN_NORMAL * MOST_MEAN_NORMAL or outward < INWARD_COSINE:
+    if nx * nx + ny * ny > MOST_MEAN_NORMAL * MOST_MEAN_NORMAL:
         return math.inf
     total = 0.0
     for k in range(DIRECTIONS_OF_WIDTH):
@@ -110,7 +120,7 @@ def _girth_of(surface: Surface, section: np.ndarray, count: int, a: tuple[float,
             t = c * dot(p, u) + d * dot(p, v)
             low, high = min(low, t), max(high, t)
         total += high - low
-    return math.pi * total / DIRECTIONS_OF_WIDTH
+    return math.copysign(math.pi * total / DIRECTIONS_OF_WIDTH, outward - INWARD_COSINE)
 
 
 @kernel
