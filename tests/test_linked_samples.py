@@ -143,3 +143,26 @@ def test_what_is_made_up_over_a_hole_leaves_the_rest_as_it_was_thinned() -> None
     taken = set(map(tuple, with_whole_boundary(filled, filled.surface, rim).points.tolist()))
     near = abs(cloud.points[:, 0] + cloud.origin[0] - 4.0) < samples.sample_spacing
     assert near.sum() > 500 and set(map(tuple, cloud.points[near].tolist())) <= taken
+
+
+def test_a_body_without_the_underside_of_its_base_faces_outwards() -> None:
+    """The base is so wide that most of its volume is not seen from the middle of the scan: a figure on a plinth was inside out."""
+    rng = np.random.default_rng(4)
+    turn, base, column = 2 * np.pi * rng.random(40_000), 5.0 * np.sqrt(rng.random(14_000)), 26.0 * rng.random(20_000)
+    plinth = np.column_stack([base * np.cos(turn[:14_000]), base * np.sin(turn[:14_000]), np.full(14_000, 0.3)])
+    rim = np.column_stack(
+        [5.0 * np.cos(turn[14_000:20_000]), 5.0 * np.sin(turn[14_000:20_000]), 0.3 * rng.random(6000)]
+    )
+    around = turn[20_000:]
+    shaft = np.column_stack([np.cos(around), np.sin(around), 0.3 + column])
+    top = np.sqrt(rng.random(1500))
+    lid = np.column_stack([top * np.cos(turn[:1500]), top * np.sin(turn[:1500]), np.full(1500, 26.3)])
+    outer = plinth[np.hypot(plinth[:, 0], plinth[:, 1]) > 1.0]
+    samples = sample_surface(
+        st.PointCloud.from_array(np.concatenate([outer, rim, shaft, lid])), st.Settings(length=0.8)
+    )
+    mean, normals = samples.surface.mean + samples.origin, samples.surface.normals
+    on_shaft = (mean[:, 2] > 2.0) & (mean[:, 2] < 25.0)
+    assert ((normals[on_shaft, :2] * mean[on_shaft, :2]).sum(axis=1) > 0.0).all()
+    on_base = (np.abs(mean[:, 2] - 0.3) < 0.1) & (np.abs(np.hypot(mean[:, 0], mean[:, 1]) - 3.0) < 0.8)
+    assert on_base.any() and (normals[on_base, 2] > 0.9).all()

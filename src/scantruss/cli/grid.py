@@ -186,7 +186,7 @@ def grid_with_notes(
         "thin_walls": "no grid passes without a closer look at the sides of the walls of this scan, so it is made as with --thin-walls",
         "plain_body": "no grid passes with all thin limbs and slits of this body, so it is made without, as with --plain-body",
         "keep_rods": "a grid with the columns, scaffold or cables of this scan fails or misses them: what was found of them is left out",
-        "limb_girth": f"no grid passes with thin limbs cut off as asked, so it is made as with --limb-girth {made.limb_girth:g}",
+        "limb_girth": f"no grid passes with all thin limbs cut off, so it is made as with --limb-girth {made.limb_girth:g}",
         "ridge_angle": "no grid keeps the ridges of this scan, so it is made without, as with --ridge-angle 0",
         "box_size": f"no grid passes with the usual sample spacing, so it is made as with --box-size {made.box_size or 0:g}",
         "effort": f"no grid passes with --effort {settings.effort}, so it is made as with --effort {made.effort}",

@@ -144,11 +144,11 @@ def note_layers(bars: Bars, cloud: PointCloud, settings: Settings) -> None:
     from ..surface.samples import sample_surface
 
     distance, share = sample_surface(cloud, settings).layers
-    if share > 0.0:
+    if share > 0.0 and not settings.thin_walls:
         unit = f" {cloud.unit}" if cloud.unit else ""
         bars.note(
             f"the scan has two layers about {distance:.2g}{unit} apart on {share:.0%} of its surface, such as top and underside;"
-            " the grid is one sheet between or on them: crop one layer away for a grid of the other"
+            " the grid is one sheet between or on them: crop one layer away for a grid of the other, or try --thin-walls for both"
         )
 
 

@@ -15,6 +15,10 @@ NEAR_GIVEN = 0.5  # cosine to the normal given below which that of a plane fit i
 HEAD_ON = 40  # links between opposite normals; a smooth two-sided surface has fewer
 NORMALS_PER_THREAD = 1500  # fewest samples that are worth a thread
 LEAST_CERTAIN = 254  # weight of the least certain links
+FACING_OF_BODY = 0.45  # length of the mean normal up to which a piece encloses something; half a sphere has 0.5
+FEWEST_AT_EDGE = 12  # samples that an edge has at least
+EDGE_ON_ONE_SIDE = 0.45  # length of the mean direction to the neighbours there; half a disc has 0.64
+MOST_ASKED = 50_000  # samples of a piece that are asked at most whether they lie at an edge
 STEEP_SINE = 0.75  # sine of the angle above the plane of a sample beyond which a neighbour is on another sheet
 
 
@@ -80,20 +84,39 @@ def mean_normals(normals: np.ndarray, neighbors: np.ndarray, facing: float) -> n
     return means
 
 
-def face_outside(mean: np.ndarray, normals: np.ndarray, piece: np.ndarray) -> None:
-    """Turn the normals of each piece, numbered from 0 (S,), away from its centre; upwards if that does not decide (a plate)."""
+def face_outside(mean: np.ndarray, normals: np.ndarray, piece: np.ndarray, neighbors: np.ndarray) -> None:
+    """Turn the normals of each piece, numbered from 0 (S,), away from its centre; upwards if that does not decide (a plate).
+
+    The centre of a body that is open somewhere, as a figure without the underside of its base, is that of its edge: seen from there what
+    is missing faces neither way, and the sum of all others is three times its volume.
+    """
     count = np.bincount(piece)
     centre = np.stack([np.bincount(piece, mean[:, c]) / count for c in range(3)], axis=1)
+    up = np.stack([np.bincount(piece, normals[:, c]) / count for c in range(3)], axis=1)
+    for body in np.flatnonzero(np.linalg.norm(up, axis=1) < FACING_OF_BODY):
+        edge = _at_edge(mean, normals, neighbors, np.flatnonzero(piece == body))
+        centre[body] = mean[edge].mean(axis=0) if len(edge) >= FEWEST_AT_EDGE else centre[body]
     arm = mean - centre[piece]
     size = np.sqrt(np.bincount(piece, dots(arm, arm)) / count)
     bulge = np.bincount(piece, dots(arm, normals)) / count
-    up = np.stack([np.bincount(piece, normals[:, c]) / count for c in range(3)], axis=1)
     for i in range(len(count)):
         side = bulge[i]
         if abs(side) < 0.01 * max(size[i], 1e-300):
             side = next((up[i, c] for c in (2, 1, 0) if abs(up[i, c]) > 1e-6), 1.0)
         if side < 0:
             normals[piece == i] *= -1.0
+
+
+def _at_edge(mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, own: np.ndarray) -> np.ndarray:
+    """Return which of some samples (K,) have neighbours on one side only."""
+    own = own[:: len(own) // MOST_ASKED + 1]
+    beside = neighbors[own]
+    known = (beside >= 0)[:, :, None]
+    arm = mean[beside] - mean[own][:, None]
+    arm -= np.einsum("kni,ki->kn", arm, normals[own])[:, :, None] * normals[own][:, None]
+    away = np.linalg.norm(arm, axis=2, keepdims=True)
+    way = np.divide(arm, away, out=np.zeros_like(arm), where=known & (away > 0.0)).sum(axis=1)
+    return own[np.linalg.norm(way, axis=1) > EDGE_ON_ONE_SIDE * np.maximum(known[:, :, 0].sum(axis=1), 1)]
 
 
 def check_two_sided(surface: Surface, thickness: np.ndarray) -> None:

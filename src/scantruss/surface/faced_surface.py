@@ -28,7 +28,7 @@ def faced_surface(
     if len(found.facing):
         face_as_given(normals, found.facing)
     normals = mean_normals(normals, neighbors, 0.7)
-    face_outside(mean, normals, piece)
+    face_outside(mean, normals, piece, neighbors)
     surface = Surface(
         points=found.grouped,
         start=found.start,

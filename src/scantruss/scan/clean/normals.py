@@ -45,7 +45,7 @@ def orient_to_one_side(near: Nearby, points: np.ndarray, normals: np.ndarray) ->
     neighbors = np.ascontiguousarray(few.neighbors[:, :LINKS_OF_A_POINT])
     cut_steep_links(place, own, neighbors)
     piece = face_one_side(place, own, neighbors)
-    face_outside(place, own, piece)
+    face_outside(place, own, piece, neighbors)
     planes, thickness = np.empty_like(own), np.empty(len(place))
     kernels.sample_normals(place, neighbors, planes, thickness, 0, len(place))
     head_on = int(kernels.head_on_links(place, own, neighbors, thickness, ONE_SIDED_THICKNESS * coarse))
