@@ -79,9 +79,9 @@ def test_the_mean_surface_is_tried_on_rough_scans_alone_and_on_very_rough_ones_a
     made = list(attempts(cloud, st.Settings(length=1.0)))
     smoothed = [k for k, attempt in enumerate(made) if attempt.settings.smooth_scale == SMOOTHING_SCALES[0]]
     assert [made[k].row for k in smoothed[:1]] == ([f"mean surface of a {first} scan over 0.5"] if first else [])
-    assert smoothed[:1] == (
-        [4] if first else []
-    )  # after the four fronts of the usual look, which has no outliers to leave out
+    # after the four fronts of the usual look, which has no outliers to leave out
+    assert smoothed[:1] == ([4] if first else [])
+    scales = [attempt.settings.smooth_scale for attempt in made]
     assert [scale for scale in scales if scale] == [scale for scale in SMOOTHING_SCALES for _ in range(2) if first]
     for asked in (0.0, 0.7):
         made = attempts(cloud, st.Settings(length=1.0, smooth_scale=asked))
@@ -331,7 +331,12 @@ def test_fronts_that_would_all_miss_the_same_limbs_are_not_tried() -> None:
         assert limit.allows(attempt) == tried
         limit = AttemptLimit()
         limit.note(attempt, fault(kind))
-        for change, alike in (({"sharp_edges": True}, True), ({"method": "paper"}, True), ({"limb_girth": 2.4}, False)):
+        for change, alike in (
+            ({"sharp_edges": True}, False),
+            ({"box_size": 0.25}, True),
+            ({"method": "paper"}, True),
+            ({"limb_girth": 2.4}, False),
+        ):
             other = replace(attempt, settings=attempt.settings.replace(**cast(Any, change)))
             assert limit.allows(other) == (tried or not alike)
 
