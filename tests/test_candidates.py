@@ -76,12 +76,12 @@ def test_the_mean_surface_is_tried_on_rough_scans_alone_and_on_very_rough_ones_a
     points = sheet(8, 8, 0.1)
     points[:, 2] += np.random.default_rng(0).normal(0.0, noise, len(points))
     cloud = st.PointCloud.from_array(points)
-    made = list(attempts(cloud, st.Settings(length=1.0)))
-    smoothed = [k for k, attempt in enumerate(made) if attempt.settings.smooth_scale == SMOOTHING_SCALES[0]]
-    assert [made[k].row for k in smoothed[:1]] == ([f"mean surface of a {first} scan over 0.5"] if first else [])
+    listed_rows = list(attempts(cloud, st.Settings(length=1.0)))
+    smoothed = [k for k, attempt in enumerate(listed_rows) if attempt.settings.smooth_scale == SMOOTHING_SCALES[0]]
+    assert [listed_rows[k].row for k in smoothed[:1]] == ([f"mean surface of a {first} scan over 0.5"] if first else [])
     # after the four fronts of the usual look, which has no outliers to leave out
     assert smoothed[:1] == ([4] if first else [])
-    scales = [attempt.settings.smooth_scale for attempt in made]
+    scales = [attempt.settings.smooth_scale for attempt in listed_rows]
     assert [scale for scale in scales if scale] == [scale for scale in SMOOTHING_SCALES for _ in range(2) if first]
     for asked in (0.0, 0.7):
         made = attempts(cloud, st.Settings(length=1.0, smooth_scale=asked))
