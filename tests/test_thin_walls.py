@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 
 import scantruss as st
 from scantruss.attempts.table import attempts
+from scantruss.kernels.geometry.boxes import new_boxes
+from scantruss.kernels.surface.samples import put_all
+from scantruss.kernels.surface.sides import vote_on_sides
 from scantruss.surface.samples import sample_surface
 
 RADIUS, WALL, HEIGHT, DEPTH = (
@@ -70,3 +73,17 @@ def test_a_pot_with_a_wall_of_a_third_of_a_member_gets_a_grid() -> None:
     assert (grid.topology.boundary_loops, grid.topology.euler, grid.topology.components) == (2, 0, 1)
     inner = np.linalg.norm((grid.nodes + grid.origin)[:, :2], axis=1) < RADIUS
     assert inner.sum() > 50  # it is lined with a grid inside as well
+
+
+@pytest.mark.kernels
+def test_samples_turn_to_the_side_of_those_around_and_away_from_those_behind() -> None:
+    x, y = np.meshgrid(np.arange(8.0), np.arange(8.0))
+    sheet = np.column_stack([x.ravel(), y.ravel(), np.zeros(64)])
+    mean = np.concatenate([sheet, sheet - (0.0, 0.0, 1.0)])
+    normals = np.repeat([[0.0, 0.0, 1.0], [0.0, 0.0, -1.0]], 64, axis=0)
+    right, wrong = normals.copy(), [9, 10, 17, 100]
+    normals[wrong] *= -1.0
+    boxes = new_boxes(mean.min(axis=0), mean.max(axis=0), 2.5, len(mean), len(mean))
+    put_all(boxes, mean, np.arange(len(mean)))
+    assert vote_on_sides(mean, normals, boxes, 2.5, 5) == len(wrong)
+    assert np.array_equal(normals, right)
