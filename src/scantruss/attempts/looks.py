@@ -29,7 +29,7 @@ ROUGH_SCAN, VERY_ROUGH_SCAN = 0.02, 0.25
 MANY_OUTLIERS = 0.002  # share of the points that must be outliers for a grid to be tried without them
 SAID_BESIDE_RODS = ("aside", "far", "peak")  # kinds of warnings of a grid that runs along rods, or misses them
 THIN_WALL, SOME_WALLS = 0.8, 0.05  # thickness of a thin wall [member lengths], and share of the places that have one
-ROUGH_AS_WALLS = 0.5  # share of its roughness that is left at most where the sides of walls are told apart
+ROUGH_AS_WALLS = 0.5  # share of its roughness that is left at most where the sides of walls are distinguished
 BESIDE_RODS = 0.5  # distance from a rod within which the place of a warning is beside it [member lengths]
 # by how much nearer a hundredth of the points must lie, in members, where members are unevener by 1 (std of their lengths / mean)
 NEARER_FOR_UNEVENER = 2.0

@@ -95,9 +95,9 @@ def _gaps_within(
     far = np.flatnonzero(away > least)
     far = far[np.argsort(-away[far], kind="stable")[:GAPS_LOOKED_AT]]
     half = np.array([empty_disc(places[at], normals[owner[at]], away[at], points, needed[at]) for at in far])
-    rim = points_of_loops(boundary)
+    edge = points_of_loops(boundary)
     half *= [
-        not is_sparse_beside(places[at], normals[owner[at]], r, points, rim) for at, r in zip(far, half, strict=True)
+        not is_sparse_beside(places[at], normals[owner[at]], r, points, edge) for at, r in zip(far, half, strict=True)
     ]
     far, half = far[half > least[far]], half[half > least[far]]
     if not len(far):
@@ -170,10 +170,10 @@ def by_x(points: np.ndarray) -> np.ndarray:
     return ordered
 
 
-def is_empty_within(curve: np.ndarray, points: np.ndarray, rim: np.ndarray | None = None) -> bool:
+def is_empty_within(curve: np.ndarray, points: np.ndarray, edge: np.ndarray | None = None) -> bool:
     """Whether a closed curve (M, 3) is around a place that is no accident to be empty.
 
-    points : (N, 3) by ascending x; rim : as of `is_sparse_beside`, which is asked too where it is given.
+    points : (N, 3) by ascending x; edge : as of `is_sparse_beside`, which is asked too where it is given.
     """
     middle = curve.mean(axis=0)
     normal = np.linalg.svd(curve - middle)[2][2]
@@ -181,7 +181,7 @@ def is_empty_within(curve: np.ndarray, points: np.ndarray, rim: np.ndarray | Non
     place = _emptiest(middle, normal, reach, points)  # a curve of few samples is not around the middle of its hole
     away = float(np.linalg.norm(points_within(place, reach, points) - place, axis=1).min(initial=reach))
     radius = empty_disc(place, normal, away, points)
-    return radius > 0.0 and (rim is None or not is_sparse_beside(place, normal, radius, points, rim))
+    return radius > 0.0 and (edge is None or not is_sparse_beside(place, normal, radius, points, edge))
 
 
 def points_of_loops(boundary: Boundary) -> np.ndarray:
@@ -189,12 +189,14 @@ def points_of_loops(boundary: Boundary) -> np.ndarray:
     return np.concatenate([np.zeros((0, 3)), *(loop.points for loop in boundary.loops)])
 
 
-def is_sparse_beside(place: np.ndarray, normal: np.ndarray, radius: float, points: np.ndarray, rim: np.ndarray) -> bool:
+def is_sparse_beside(
+    place: np.ndarray, normal: np.ndarray, radius: float, points: np.ndarray, edge: np.ndarray
+) -> bool:
     """Whether points are so few on one side of an empty disc that it may belong to a sparse part of the scan, and is no opening.
 
-    points : (N, 3) by ascending x; rim : (B, 3) boundary of the scan, near which no side is looked at.
+    points : (N, 3) by ascending x; edge : (B, 3) boundary of the scan, near which no side is looked at.
     """
-    if radius <= 0.0 or bool((((rim - place) ** 2).sum(axis=1) < (2.0 * radius) ** 2).any()):
+    if radius <= 0.0 or bool((((edge - place) ** 2).sum(axis=1) < (2.0 * radius) ** 2).any()):
         return False
     around = points_within(place, 3.0 * radius, points) - place
     x, y = np.linalg.svd(normal[None])[2][1:]

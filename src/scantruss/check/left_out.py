@@ -185,8 +185,8 @@ def closed_holes(samples: SurfaceSamples, boundary: Boundary) -> list[LeftOut]:
     filled = [places for places in filled if not _closes_body(places, samples)]
     holes = [_hole(places, samples, asked=True) for places in filled]
     points = by_x(samples.measured_points) if boundary.bridged else samples.measured_points
-    rim = points_of_loops(boundary)
-    holes += [_hole(curve, samples, asked=False) for curve in boundary.bridged if is_empty_within(curve, points, rim)]
+    edge = points_of_loops(boundary)
+    holes += [_hole(curve, samples, asked=False) for curve in boundary.bridged if is_empty_within(curve, points, edge)]
     holes = without_caps(holes, samples)
     return first_and_more(sorted(holes, key=lambda hole: -(hole.size or 0.0)))
 

@@ -53,7 +53,7 @@ class Asked(NamedTuple):
     smooth_scale: float  #: size of what is smoothed away [`length`]
     sharp_edges: bool  #: whether samples on sharp edges of bodies face away from them
     plain_body: bool  #: whether thin limbs are taken off the body that the scan encloses, and slits filled
-    thin_walls: bool  #: whether the sides of thin walls are told apart first
+    thin_walls: bool  #: whether the sides of thin walls are distinguished first
 
     @classmethod
     def of(cls, settings: Settings, origin: np.ndarray, z_is_up: bool = False) -> Asked:

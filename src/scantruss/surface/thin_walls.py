@@ -25,7 +25,7 @@ PASSES = 3  # times that normals are averaged with those beside them
 def normals_of_walls(points: np.ndarray, spacing: float, length: float) -> GivenNormals | None:
     """Return normals of points (N, 3) that face away from the walls between them, for members of a length [scan unit].
 
-    None where they face both ways all over, so that there are no walls to be told apart.
+    None where they face both ways all over, so that there are no sides to distinguish.
     """
     apart, given = max(WALL_SPACING * spacing, WALL_SHARE * length), None
     for _ in range(ROUNDS):
