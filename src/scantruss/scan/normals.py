@@ -18,7 +18,7 @@ LEAST_CERTAIN = 254  # weight of the least certain links
 FACING_OF_BODY = 0.45  # length of the mean normal up to which a piece encloses something; half a sphere has 0.5
 FEWEST_AT_EDGE = 12  # samples that an edge has at least
 EDGE_ON_ONE_SIDE = 0.45  # length of the mean direction to the neighbours there; half a disc has 0.64
-MOST_ASKED = 50_000  # samples of a piece that are asked at most whether they lie at an edge
+MOST_ASKED = 3_000  # samples of a piece that are asked at most whether they lie at an edge
 STEEP_SINE = 0.75  # sine of the angle above the plane of a sample beyond which a neighbour is on another sheet
 
 
