@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
@@ -230,6 +231,18 @@ def test_what_a_grid_of_the_mean_surface_rounds_off_is_said_as_far_as_it_is_no_r
     assert "rounded" in {fault.kind for fault in certify(grid, samples, NOTHING, SETTINGS).faults}  # all points
     smooth = certify(grid, replace(samples, moved=1.0), NOTHING, SETTINGS)
     assert "rounded" not in {each.kind for each in (*smooth.faults, *smooth.warnings)}
+
+
+def test_what_a_grid_of_the_mean_surface_cuts_off_is_said_in_full_where_most_of_the_scan_is_bent() -> None:
+    """Waves that are smoothed away scatter the points around the nodes, but they are no roughness."""
+    points = sheet(13, 8, 0.08)
+    points[:, 2] += 0.45 * np.sin(3.0 * points[:, 0]) * np.sin(3.0 * points[:, 1])
+    samples, grid = scanned(points, lattice())
+    found = certify(grid, replace(samples, moved=1.0), NOTHING, SETTINGS)
+    (warning,) = (warning for warning in found.warnings if warning.kind == "rounded")
+    said, share = int(re.findall(r"rounds off (\d+)%", warning.words)[0]), 100 * (np.abs(points[:, 2]) > 0.25).mean()
+    assert 0.8 * share < said < 1.2 * share
+    assert known(found.node_scatter) > 0.05  # by which nearly all of that was taken for scatter
 
 
 def bounded(grid: st.Grid) -> Boundary:

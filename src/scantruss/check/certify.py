@@ -27,8 +27,8 @@ from .handles import false_struts
 from .hanging import hanging_nodes, nodes_off_sheets
 from .irregular import count_irregular
 from .left_out import asked_for, closed_holes, first_and_more, parts_left_out, without_caps
-from .limits import NOISES_OFF, limits_of, mostly_rounded, places_to_look_at, widened_limits
-from .missed import farthest_followed, largest_patch_missed, points_missed, share_rounded
+from .limits import COVER_REACH, limits_of, mostly_rounded, places_to_look_at, widened_limits
+from .missed import farthest_followed, largest_patch_missed, points_missed, shares_rounded
 from .openings import boundary_faults
 from .sheets import cut_apart, faults_on_sheets, nodes_of_samples
 from .slits import feet_on, narrow_gaps
@@ -41,9 +41,6 @@ if TYPE_CHECKING:
     from ..grid.grid import Grid
     from ..settings import Settings
     from ..surface.samples import SurfaceSamples
-
-# distance within which a point of the scan and a triangle are in reach of each other [member lengths]
-COVER_REACH = 0.5
 
 FAULTS_NAMED = 3  # faults that a refusal names
 MOST_ACCEPTED = 0.3  # share of the scan that is missed above which no refusal names the setting that accepts it
@@ -102,7 +99,7 @@ class Judged:
         members = _desired_at_points(grid, found, length)
         followed = _to_follow(samples)
         missed_at = place_of(samples.scan[farthest_followed(found.scan, followed, members)] + samples.origin)
-        rough = samples.moved  # then its roughness is the scatter
+        rough = samples.moved
         feet = feet_on(grid, samples, found, length)
         offsets, (gaps, bridged), doubtful, aside, beyond, beside, apart, bare, peaks = side_by_side(
             lambda: _offsets(grid, samples, length),
@@ -115,9 +112,10 @@ class Judged:
             lambda: mostly_bare(grid, samples, feet, length),
             lambda: [] if rough else rounded_peaks(grid, samples, found, followed, members),
         )
-        roughness = NOISES_OFF * offsets.get("node_scatter", 0.0) if rough else 0.0
-        rounded = share_rounded(found.scan, followed, members, COVER_REACH * members, roughness)
-        places = places_to_look_at(self.certificate, missed_at, rounded)
+        scatter = offsets.get("node_scatter", 0.0) if rough else 0.0
+        rounded, beyond_scatter = shares_rounded(grid, samples, found, followed, members, scatter)
+        too_far = mostly_rounded(beyond_scatter, missed_at)
+        places = places_to_look_at(self.certificate, missed_at, 0.0 if too_far else rounded)
         closed = asked_for(closed_holes(samples, boundary), settings.fill_at, length)
         gaps = asked_for(without_caps(gaps, samples), settings.fill_at, length)
         slits, narrow, parts = narrow_gaps(grid, samples, feet, found, [*closed, *gaps], length)
@@ -134,7 +132,7 @@ class Judged:
                 *beyond,
                 *bare,
                 *(each for each in bridged if each.kind == "bridged"),
-                *mostly_rounded(rounded, missed_at),
+                *too_far,
             ),
             warnings=(
                 *self.certificate.warnings,

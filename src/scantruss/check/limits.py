@@ -28,6 +28,8 @@ WARN_FOLD = 45.0  # angle between neighbouring triangles below which the fold is
 WARN_OFFSET = 0.05  # distance of a node from the scan, beyond its noise, from which on that is poor [member lengths]
 NOISES_OFF = 3.0  # rms distances of points from their plane that are noise
 PLACES_KEPT = 30  # places of a fault that are kept, the worst first
+# distance within which a point of the scan and a triangle are in reach of each other [member lengths]
+COVER_REACH = 0.5
 ROUNDED_BY = 0.25  # distance from the grid above which a point is rounded off [member lengths]
 # share of the points that are rounded off above which it is a fault: 0.23 where nodes jump between two layers, 0.16 at most on others
 MOST_ROUNDED = 0.2
@@ -149,7 +151,7 @@ def places_to_look_at(found: Certificate, missed_at: Place, rounded: float = 0.0
         farther = any(part.kind == "far" for part in alone)
         words = f"misses {nearer:.1%} of the points by {'half a member to a member' if farther else 'more than half a member'}"
         warnings.append(Fault("missed", words, missed_at))
-    if WARN_LEFT_OUT < rounded <= MOST_ROUNDED:
+    if rounded > WARN_LEFT_OUT:
         words = (
             f"rounds off {rounded:.0%} of the points by more than a quarter of a member; shorter members follow them"
         )

@@ -9,10 +9,13 @@ import numpy as np
 from ..grid.certificate import place_of
 from ..surface.chosen_samples import KEPT, LIMB, SLIT
 from .left_out import LIMBS_APART, points_together
-from .limits import ROUNDED_BY
+from .limits import COVER_REACH, NOISES_OFF, ROUNDED_BY
+from .unfollowed import mean_heights
 
 if TYPE_CHECKING:
+    from ..grid.grid import Grid
     from ..surface.samples import SurfaceSamples
+    from .distances import Distances
 
 
 def points_missed(samples: SurfaceSamples, distance: np.ndarray, reach: np.ndarray) -> np.ndarray:
@@ -43,13 +46,30 @@ def farthest_followed(distance: np.ndarray, followed: np.ndarray, members: np.nd
     return int(np.where(followed & (distance <= members), distance / members, -1.0).argmax())
 
 
-def share_rounded(
-    distance: np.ndarray, followed: np.ndarray, members: np.ndarray, reach: np.ndarray, roughness: float
-) -> float:
-    """Return the share of the points that a grid rounds off: of those that it follows (N,) bool, by desired member lengths (N,).
+def shares_rounded(
+    grid: Grid,
+    samples: SurfaceSamples,
+    found: Distances,
+    followed: np.ndarray,
+    members: np.ndarray,
+    scatter: float,
+) -> tuple[float, float]:
+    """Return the share of the points that a grid rounds off, and of those that it rounds off by more than their scatter.
 
-    distance, reach : (N,) of each point from the grid, and that from which on it is missed [scan unit]
-    roughness : distance from the grid up to which points are scatter about the mean surface [scan unit]
+    Of a mean surface only that is rounded off which does not lie on both sides of it.
+
+    followed : (N,) bool, points of the scan that the grid is to follow
+    members : (N,) desired member length at each point [scan unit]
+    scatter : usual distance of the points from the mean surface [scan unit]
     """
-    off = (distance > ROUNDED_BY * members + roughness) & (distance <= reach)
+    off = mean_heights(grid, samples, found, members) if samples.moved else found.scan
+    return (
+        _share_between(off, followed, members, 0.0),
+        _share_between(found.scan, followed, members, NOISES_OFF * scatter),
+    )
+
+
+def _share_between(distance: np.ndarray, followed: np.ndarray, members: np.ndarray, roughness: float) -> float:
+    """Return the share of the points that are followed and too far off to be on the grid, but not so far that they are missed."""
+    off = (distance > ROUNDED_BY * members + roughness) & (distance <= COVER_REACH * members)
     return float((followed & off).mean())

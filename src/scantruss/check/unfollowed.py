@@ -42,7 +42,7 @@ WARN_UNFOLLOWED = 0.3  # ... above which that is said: 0.30 to 0.48 on corrugate
 SHARE_OF_COARSE, FAR_OFF_COARSE, TWENTIETH = 0.25, 0.24, 0.95
 # share of the points on triangles that stand off the middle of their points by more than the second, above which a grid does not follow
 # the mean surface of its scan: a body smoothed away is smaller than the scan, folds that are lie on both sides [member lengths]
-MOST_OFF_MEAN, OFF_MEAN = 0.33, 0.2
+MOST_OFF_MEAN, OFF_MEAN = 0.15, 0.2
 # distance from the grid, beyond the noise, from which on points are of a peak that it cuts off [member lengths], and how many these
 # are at least, in all and times as many as points of a line as long
 HEIGHT_OF_PEAK, FEWEST_OF_PEAK, WIDTH_OF_PEAK = 0.3, 12, 3.0
@@ -192,14 +192,33 @@ def _followed_to(grid: Grid) -> np.ndarray:
     return followed
 
 
+def mean_heights(grid: Grid, samples: SurfaceSamples, found: Distances, members: np.ndarray) -> np.ndarray:
+    """Return how far each place of the scan lies off a grid (N,): the mean of the heights of its points, in which roughness is lost.
+
+    members : (N,) desired member length at each point [scan unit]
+    """
+    height, feet = feet_over(grid, found.triangle, samples.scan)
+    number = _cubes(feet, _cube(samples, members))
+    mean: np.ndarray = np.abs(np.bincount(number, height) / np.bincount(number))[number]
+    return mean
+
+
 def _mostly(off: np.ndarray, points: np.ndarray, side: float) -> np.ndarray:
     """Return which points (K, 3) lie in a cube of which most points are off (K,) bool."""
+    number = _cubes(points, side)
+    mostly: np.ndarray = (2 * np.bincount(number, off) > np.bincount(number))[number]
+    return mostly
+
+
+def _cubes(points: np.ndarray, side: float) -> np.ndarray:
+    """Return the number of the cube of a width [scan unit] in which each point lies (K,)."""
     cube = np.floor(points / side).astype(np.int64)
     cube -= cube.min(axis=0)
     across = cube.max(axis=0) + 1
-    _, number = np.unique((cube[:, 0] * across[1] + cube[:, 1]) * across[2] + cube[:, 2], return_inverse=True)
-    mostly: np.ndarray = (2 * np.bincount(number, off) > np.bincount(number))[number]
-    return mostly
+    number: np.ndarray = np.unique((cube[:, 0] * across[1] + cube[:, 1]) * across[2] + cube[:, 2], return_inverse=True)[
+        1
+    ]
+    return number
 
 
 def _size(which: np.ndarray, samples: SurfaceSamples) -> float:

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...boundary.find import find_boundary
-from ...check.certify import COVER_REACH
 from ...check.distances import distances_to_grid
 from ...check.left_out import points_left_out
+from ...check.limits import COVER_REACH
 from ...errors import words_of_count
 from ...grid.certificate import KINDS_LEFT_OUT
 from ...surface.samples import sample_surface
