@@ -332,7 +332,7 @@ def test_a_length_that_closes_openings_gives_way_to_the_next_below_that_leaves_t
     def tried(advice: Advice, length: float, most: int = 0) -> LengthTrial:
         size = (1.2 if length > closes_from * advice._usual else 0.9) * length
         part = SimpleNamespace(kind=kind, asked=False, size=size)
-        found = SimpleNamespace(judged_out=lost if length < advice._usual else 0.0, left_out=(part,))
+        found = SimpleNamespace(judged_out=lost if length < advice._usual else 0.0, left_out=(part,), warnings=())
         return LengthTrial(length, cast(Any, SimpleNamespace(certificate=found)))
 
     monkeypatch.setattr(Advice, "try_length", tried)
@@ -342,6 +342,29 @@ def test_a_length_that_closes_openings_gives_way_to_the_next_below_that_leaves_t
     lost = 0.005  # of the scan, which the usual one does not
     assert advice.suggest() == advice._usual
     closes_from, lost = 0.1, 0.0  # then so does the shorter one
+    assert advice.suggest() == advice._usual
+
+
+@pytest.mark.parametrize("kind", ["lost", "crushed"])
+def test_a_length_that_loses_ridges_gives_way_to_the_next_below_that_follows_them(
+    kind: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def tried(advice: Advice, length: float, most: int = 0) -> LengthTrial:
+        warnings = (SimpleNamespace(kind=kind if length > loses_from * advice._usual else "peak"),)
+        hole = SimpleNamespace(kind="hole", asked=False, size=2.0 * length)
+        left_out = (hole,) * (closes and length < advice._usual)
+        found = SimpleNamespace(judged_out=0.0, left_out=left_out, warnings=warnings)
+        return LengthTrial(length, cast(Any, SimpleNamespace(certificate=found)))
+
+    monkeypatch.setattr(Advice, "try_length", tried)
+    advice = Advice(cloud_of("limpet"), st.Settings(length=1.0))
+    loses_from, closes = 0.9, False
+    assert advice.suggest() == advice.next_below(advice._usual)
+    closes = True  # then the shorter one closes an opening
+    assert advice.suggest() == advice._usual
+    loses_from, closes = 0.1, False  # then it loses ridges too
+    assert advice.suggest() == advice._usual
+    loses_from = 1.1  # then none of both does
     assert advice.suggest() == advice._usual
 
 

@@ -6,10 +6,11 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from ..check.limits import with_ridges_given_up
+from ..check.limits import with_ridges_given_up, with_ridges_lost
 from ..errors import CertificateError, FrontError, OneSidedError, ScanTrussError
 from .limit import AttemptLimit, joins_sheets, loses_limbs, only_leaves_out
 from .looks import breaks_limb, runs_along_rods, stands_on_columns
+from .lost_ridges import lost_ridges
 from .table import attempts
 
 if TYPE_CHECKING:
@@ -109,7 +110,9 @@ class AttemptCourse:
             if self._passed is None:
                 self.failed(attempt, CertificateError(BREAKS_LIMB, grid, place))
             return
-        grid = with_ridges_given_up(grid, attempt.ridges_given_up(self._cloud))
+        given_up = attempt.ridges_given_up(self._cloud)
+        lost = lost_ridges(grid, self._cloud, self._settings, given_up)
+        grid = with_ridges_lost(with_ridges_given_up(grid, given_up), lost)
         if self._passed is not None:  # this one is without rods
             assert grid.certificate is not None and self._passed.certificate is not None
             fewer = len(grid.certificate.warnings) < len(self._passed.certificate.warnings)

@@ -18,6 +18,7 @@ from ..surface.chosen_samples import KEPT, OUTLIER
 from .bare import mostly_bare
 from .boundaries import places_aside, stops_short
 from .crossings import find_crossings
+from .crushed import crushed_parts, spikes
 from .defects import faults_in_space, faults_of_topology, fixed_off_scan
 from .distances import Distances, measure_distances, offsets_from_points
 from .doubtful import doubtful_places
@@ -145,6 +146,7 @@ class Judged:
                 *aside,
                 *beside,
                 *peaks,
+                *crushed_parts(grid, samples, found, length),
                 *places,
             ),
             **offsets,
@@ -179,6 +181,7 @@ def judge(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings: Set
         *faults_on_sheets(grid, samples, nearest),
         *hanging_nodes(grid, samples, found, length),
         *nodes_off_sheets(grid, samples, length),
+        *spikes(grid, samples, found, length),
         *_mostly_unfollowed(grid, samples, found, length),
     )
     faults += [fault for fault in further if fault.kind not in known]
@@ -235,7 +238,7 @@ def _way_out(found: Certificate) -> str:
         return "longer members cover it, --allow-missing accepts more of the scan missing"
     if kinds <= {"beyond", "bridged"}:
         return "shorter members keep to it, --crop leaves out what lies beyond it; --keep-failed gives it all the same"
-    if "hanging" in kinds:
+    if "hanging" in kinds or kinds == {"spike"}:
         return "--crop or --piece leaves out what lies off the surface, shorter members keep to it; --keep-failed gives it all the same"
     if kinds == {"cover"} and found.missing > 0.0:
         return f"--allow-missing {math.ceil(100.0 * found.missing) / 100.0:g} accepts that"

@@ -124,13 +124,19 @@ class PointedNodes:
         return np.flatnonzero((count >= FEWEST_MEMBERS) & (2 * count >= self.uses))
 
 
-def _pointed_nodes(grid: Grid, samples: SurfaceSamples, desired: np.ndarray, steep: float) -> PointedNodes:
-    """Return the nodes within a grid whose mean unit vector along members (V, 3) is longer than `steep`."""
+def axes_of_nodes(grid: Grid) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return the ends of all members, each way (2 E, 2), the unit vectors along them (2 E, 3), how many a node has and their mean."""
     ends = np.concatenate([grid.edges, grid.edges[:, ::-1]])
     ways = grid.nodes[ends[:, 1]] - grid.nodes[ends[:, 0]]
     ways /= np.maximum(np.linalg.norm(ways, axis=1), 1e-300)[:, None]
     uses = np.maximum(np.bincount(ends[:, 0], minlength=len(grid.nodes)), 1)
     axes = np.stack([np.bincount(ends[:, 0], ways[:, k], len(grid.nodes)) for k in range(3)], axis=1) / uses[:, None]
+    return ends, ways, uses, axes
+
+
+def _pointed_nodes(grid: Grid, samples: SurfaceSamples, desired: np.ndarray, steep: float) -> PointedNodes:
+    """Return the nodes within a grid whose mean unit vector along members (V, 3) is longer than `steep`."""
+    ends, ways, uses, axes = axes_of_nodes(grid)
     pointed = np.linalg.norm(axes, axis=1) > steep
     pointed[grid.edges[grid.edge_triangles[:, 1] < 0]] = False
     which = np.flatnonzero(pointed[ends[:, 0]])

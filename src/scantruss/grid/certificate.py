@@ -24,9 +24,9 @@ class Worst:
 class Fault:
     """What is wrong with a grid; "the grid " and `words` make a sentence."""
 
-    #: empty manifold orientable pieces loops crossing folded uneven cover torn astray fixed beyond bridged; angle
+    #: empty manifold orientable pieces loops crossing folded uneven cover torn astray fixed beyond bridged spike; angle
     #: short long offset unfollowed rounded as fault or warning; of a warning aside, far, left out, gap, closed, hole, zigzag,
-    #: cut, missed, peak, apart, ridge, stops, fixed
+    #: cut, missed, peak, apart, ridge, lost, crushed, stops, fixed
     kind: str
     words: str
     where: Place | None = None  #: a place in the scan's own frame [scan unit], the worst
@@ -73,7 +73,7 @@ class LeftOut:
 #: words for the kinds of `LeftOut` that a grid knows of itself
 KINDS_LEFT_OUT = {
     "duplicates": "duplicates",
-    "outliers": "outliers, which lie on no surface",
+    "outliers": "set aside as outliers",
     "rods": "columns, scaffold or cables, thinner than a member",
     "limbs": "on a limb, handle or neck too thin for the members, cut off at a ring",
     "slits": "in a slit too narrow for the members, filled",

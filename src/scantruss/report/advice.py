@@ -60,11 +60,8 @@ POINTS_LOOKED_AT = 2_000_000  # points that are looked at for that
 LEAST_TRIED = 5.0  # grids that are made for that even where the scan has more points
 TRIED_AROUND = 6.0  # grids that are made besides for the lengths of the table, one each
 TRIED_LONGER = 2  # grids that are made of each longer length where no other has passed, of those for the table
-BESIDE_USUAL = (
-    1.12,
-    0.9,
-    1.25,
-)  # lengths that are tried then where none of these passes, as multiples of the usual one
+# lengths that are tried then where none of these passes, as multiples of the usual one
+BESIDE_USUAL = (1.12, 0.9, 1.25)
 TRIED_USUAL = 4.0  # grids that are made at the usual length where no length nearby passes and it is far away
 FAR_TOO_SHORT = 0.2  # share of the shortest possible length below which the usual one is looked at alone: that length is in another unit
 POINTS_PER_MEMBER = 9  # points that cost as much as a member of the grid
@@ -201,8 +198,8 @@ class Advice:
         It is the first of those tried in turn that passes with what is next above it, both without much of the scan lost; else of
         those that pass with what is next above them the first that loses hardly more than the least; else the next below one that
         passes, if it passes too; else one that passes, if there is one with another not far above it that passes too; else the usual
-        length. Where none passes, longer ones are looked at once more, then those beside the usual one. One that closes openings gives
-        way to the next below it, if that passes, closes none and loses no more.
+        length. Where none passes, longer ones are looked at once more, then those beside the usual one. One that closes openings or
+        loses ridges gives way to the next below it, if that passes, does neither more and loses no more.
         """
         self.is_spent = True
         low, high = length_range(self._cloud)
@@ -220,7 +217,7 @@ class Advice:
             if above is not None and above.passed:
                 both[length] = max(trial.lost, above.lost)
                 if both[length] <= MOST_LOST:
-                    return self._leaving_open(trial)
+                    return self._following_more(trial)
         if both:
             least = min(both.values())
             return next(length for length, lost in both.items() if lost <= least + LOST_ALIKE)
@@ -238,13 +235,16 @@ class Advice:
         followed = [one for one in passing if any(one < other <= NEARLY_NEXT * one for other in passing)]
         return min(followed or passing, key=self._far_from_usual, default=self._usual)
 
-    def _leaving_open(self, trial: LengthTrial) -> float:
-        """Return the length of a trial that passes, or the next below it if that leaves open what this one closes, and loses no more."""
+    def _following_more(self, trial: LengthTrial) -> float:
+        """Return the length of a trial that passes, or the next below it if that follows what this one does not, and loses no more.
+
+        That is openings which this one closes, or ridges which it loses.
+        """
         below = self.next_below(trial.length)
-        shorter = self.try_length(below, A_FEW) if trial.closes_openings and below < trial.length else None
-        if shorter is None or not shorter.passed or shorter.closes_openings:
+        shorter = self.try_length(below, A_FEW) if trial.follows_less and below < trial.length else None
+        if shorter is None or not shorter.passed or shorter.lost > trial.lost + LOST_ALIKE:
             return trial.length
-        return below if shorter.lost <= trial.lost + LOST_ALIKE else trial.length
+        return below if shorter.follows_less < trial.follows_less else trial.length
 
     def _try_longer(self) -> None:
         """Try longer lengths than the usual one until one passes, with the grids of the table: columns are then seen for what they are.

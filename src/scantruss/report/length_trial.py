@@ -5,6 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+# kinds of warnings of what shorter members may follow
+CRUSHED_OR_LOST = ("crushed", "lost")
+
 if TYPE_CHECKING:
     from ..errors import FrontError
     from ..grid.grid import Grid
@@ -45,10 +48,16 @@ class LengthTrial:
         return self.grid.certificate.judged_out
 
     @property
-    def closes_openings(self) -> bool:
-        """Whether the grid closes openings or gaps of the scan longer than a member that nobody asked to be closed."""
+    def follows_less(self) -> int:
+        """What of the scan the grid does not follow though shorter members may: 2 for openings or gaps longer than a member, 1 for ridges.
+
+        Openings that somebody asked to be closed do not count.
+        """
         found = self.grid.certificate if self.grid is not None else None
-        return found is not None and any(
+        if found is None:
+            return 0
+        closes_openings = any(
             part.kind in ("hole", "gap") and not part.asked and (part.size or 0.0) > self.length
             for part in found.left_out
         )
+        return 2 * closes_openings + any(warning.kind in CRUSHED_OR_LOST for warning in found.warnings)

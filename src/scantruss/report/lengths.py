@@ -59,6 +59,7 @@ def result_of(trial: LengthTrial | None) -> str:
         if share >= 0.0005
     ]
     parts += [warning.words for warning in found.warnings if warning.kind == "sparse"]
+    parts += ["loses ridges"] * any(warning.kind == "lost" for warning in found.warnings)
     for kind, what in (("hole", "closed"), ("gap", "bridged")):
         number = sum(part.number for part in found.left_out if part.kind == kind)
         parts += [f"{number} {kind}{'s' if number > 1 else ''} {what}"] * (number > 0)

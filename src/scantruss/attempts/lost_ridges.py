@@ -1,0 +1,98 @@
+"""Folds of a scan that its grid cuts across, where members are too long for them or a ridge ends too early."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..boundary.curves import length_along
+from ..check.distances import distances_to_grid
+from ..check.left_out import points_together
+from ..check.limits import NOISES_OFF
+from ..constraints.lines_of_folds import FOLD_STRIDE, GAIN_OF_SURE
+from ..constraints.network import runs
+from ..constraints.ridges import fold_lines
+from ..errors import ScanTrussError
+from ..surface.chosen_samples import KEPT
+from ..surface.samples import sample_surface
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ..grid.grid import Grid
+    from ..scan.cloud import PointCloud
+    from ..settings import Settings
+
+FINER = 0.5  # member length at which the folds are looked for, in that of the grid
+FEWEST_SPACINGS_OF_FINER = 4.0  # ... and at least, in spacings of the points
+COARSEST_FINER = 0.8  # ... and at most, in that of the grid
+# distance of points from the grid, noise aside, from which on they may be of a fold that is cut off, how far these lie apart at most, and
+# the least length of a patch of them [member lengths]
+OFF_AT_FOLD, APART_AT_FOLD, LONG_AT_FOLD = 0.05, 0.25, 0.7
+# mean distance of a member's length of a fold from the grid from which on it is cut off: where a ridge follows it it is 0.02 at most
+FOLD_OFF = 0.035  # [member lengths]
+SAID_ALREADY = 0.5  # distance from a part of a ridge that is given up within which a fold is that part [member lengths]
+# shortest part of a fold that is lost, and least length of all together [member lengths]
+SHORTEST_LOST, LEAST_LOST = 1.0, 2.0
+
+
+def lost_ridges(
+    grid: Grid, cloud: PointCloud, asked: Settings, given_up: Sequence[np.ndarray] = ()
+) -> list[np.ndarray]:
+    """Return the parts of folds of a scan that a grid cuts across, the longest first, each (K, 3) [scan unit].
+
+    They are looked for at half of the member length: folds too close together, or too short, to be ridges at the whole are seen there.
+
+    Parameters
+    ----------
+    asked : Settings
+        Those that were asked for; where they want no ridges, none is lost.
+    given_up : parts of ridges, each (K, 3) [scan unit], that are said already
+    """
+    made = grid.settings or asked
+    if asked.ridge_angle <= 0.0 or asked.method != "default" or made.smooth_scale:
+        return []
+    length = float(made.length if grid.desired is None else grid.desired.min())
+    finer = max(FINER * length, FEWEST_SPACINGS_OF_FINER * cloud.spacing)
+    if finer > COARSEST_FINER * length or not _may_cut_folds(grid, cloud, made, length):
+        return []
+    settings = made.replace(length=finer, length_field="", ridge_angle=asked.ridge_angle)
+    try:
+        samples = sample_surface(cloud, settings)
+        lines = [] if samples.smooth else fold_lines(samples, settings).narrow
+    except ScanTrussError:  # it carries no grid of such members, or its folds are a tangle
+        return []
+    said = np.concatenate([np.zeros((0, 3)), *given_up]) - cloud.origin
+    found = []
+    for folds in lines:
+        if np.median(folds["gain"]) >= GAIN_OF_SURE:
+            cut = _is_cut(folds["place"], grid, length, said, round(length / (FOLD_STRIDE * finer)))
+            found += [folds["place"][begin:end] for begin, end in runs(cut)]
+    found = [part + cloud.origin for part in found if length_along(part) >= SHORTEST_LOST * length]
+    found.sort(key=length_along, reverse=True)
+    return found if sum(map(length_along, found)) >= LEAST_LOST * length else []
+
+
+def _may_cut_folds(grid: Grid, cloud: PointCloud, made: Settings, length: float) -> bool:
+    """Whether points that lie off a grid are of a patch as long as the shortest part of a fold that counts."""
+    samples = sample_surface(cloud, made)
+    points = np.ascontiguousarray(samples.scan[(samples.judged == KEPT) & ~samples.elsewhere])
+    noise = grid.certificate.noise if grid.certificate is not None else 0.0
+    away = distances_to_grid(points, grid, length)[0]
+    off = points[(away > OFF_AT_FOLD * length + NOISES_OFF * noise) & (away < length)]
+    if not len(off):
+        return False
+    patch = points_together(off, np.full(len(off), APART_AT_FOLD * length))
+    large = np.flatnonzero(np.bincount(patch) * cloud.spacing >= LONG_AT_FOLD * length)
+    return any(np.ptp(off[patch == number], axis=0).max() >= LONG_AT_FOLD * length for number in large)
+
+
+def _is_cut(places: np.ndarray, grid: Grid, length: float, said: np.ndarray, window: int) -> np.ndarray:
+    """Return which places along a fold (K, 3) lie off a grid in the mean of so many beside each other, away from places (M, 3)."""
+    away = distances_to_grid(np.ascontiguousarray(places), grid, length)[0]
+    around = np.ones(min(window, len(places)))
+    mean = np.convolve(away, around, "same") / np.convolve(np.ones(len(places)), around, "same")
+    cut: np.ndarray = mean > FOLD_OFF * length
+    gaps = np.linalg.norm(places[:, None] - said, axis=2).min(axis=1, initial=np.inf)
+    return cut & (gaps > SAID_ALREADY * length)
