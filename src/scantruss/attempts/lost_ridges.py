@@ -14,6 +14,7 @@ from ..constraints.lines_of_folds import FOLD_STRIDE, GAIN_OF_SURE
 from ..constraints.network import runs
 from ..constraints.ridges import fold_lines
 from ..errors import ScanTrussError
+from ..grid.line_sets import RIDGE, sets_of
 from ..surface.chosen_samples import KEPT
 from ..surface.samples import sample_surface
 
@@ -32,7 +33,9 @@ COARSEST_FINER = 0.8  # ... and at most, in that of the grid
 OFF_AT_FOLD, APART_AT_FOLD, LONG_AT_FOLD = 0.05, 0.25, 0.7
 # mean distance of a member's length of a fold from the grid from which on it is cut off: where a ridge follows it it is 0.02 at most
 FOLD_OFF = 0.035  # [member lengths]
-SAID_ALREADY = 0.5  # distance from a part of a ridge that is given up within which a fold is that part [member lengths]
+# distance from a chain of the grid, or from a part of a ridge that is given up, within which a fold is that one [member lengths]
+SAME_FOLD = 0.2
+PLACES_ON_MEMBER = 6  # places on each member of a chain from which that is measured
 # shortest part of a fold that is lost, and least length of all together [member lengths]
 SHORTEST_LOST, LEAST_LOST = 1.0, 2.0
 
@@ -63,11 +66,11 @@ def lost_ridges(
         lines = [] if samples.smooth else fold_lines(samples, settings).narrow
     except ScanTrussError:  # it carries no grid of such members, or its folds are a tangle
         return []
-    said = np.concatenate([np.zeros((0, 3)), *given_up]) - cloud.origin
+    known = np.concatenate([_places_on_chains(grid), *(part - cloud.origin for part in given_up)])
     found = []
     for folds in lines:
         if np.median(folds["gain"]) >= GAIN_OF_SURE:
-            cut = _is_cut(folds["place"], grid, length, said, round(length / (FOLD_STRIDE * finer)))
+            cut = _is_cut(folds["place"], grid, length, known, round(length / (FOLD_STRIDE * finer)))
             found += [folds["place"][begin:end] for begin, end in runs(cut)]
     found = [part + cloud.origin for part in found if length_along(part) >= SHORTEST_LOST * length]
     found.sort(key=length_along, reverse=True)
@@ -88,11 +91,19 @@ def _may_cut_folds(grid: Grid, cloud: PointCloud, made: Settings, length: float)
     return any(np.ptp(off[patch == number], axis=0).max() >= LONG_AT_FOLD * length for number in large)
 
 
-def _is_cut(places: np.ndarray, grid: Grid, length: float, said: np.ndarray, window: int) -> np.ndarray:
+def _is_cut(places: np.ndarray, grid: Grid, length: float, known: np.ndarray, window: int) -> np.ndarray:
     """Return which places along a fold (K, 3) lie off a grid in the mean of so many beside each other, away from places (M, 3)."""
     away = distances_to_grid(np.ascontiguousarray(places), grid, length)[0]
     around = np.ones(min(window, len(places)))
     mean = np.convolve(away, around, "same") / np.convolve(np.ones(len(places)), around, "same")
     cut: np.ndarray = mean > FOLD_OFF * length
-    gaps = np.linalg.norm(places[:, None] - said, axis=2).min(axis=1, initial=np.inf)
-    return cut & (gaps > SAID_ALREADY * length)
+    gaps = np.linalg.norm(places[:, None] - known, axis=2).min(axis=1, initial=np.inf)
+    return cut & (gaps > SAME_FOLD * length)
+
+
+def _places_on_chains(grid: Grid) -> np.ndarray:
+    """Return places along the chains of the ridges that a grid follows (K, 3)."""
+    chains = [grid.nodes[np.array(each["nodes"], np.int64)] for each in sets_of(grid, RIDGE)]
+    shares = np.linspace(0.0, 1.0, PLACES_ON_MEMBER)[:, None, None]
+    along = [(chain[:-1] + shares * np.diff(chain, axis=0)).reshape(-1, 3) for chain in chains]
+    return np.concatenate([np.zeros((0, 3)), *along])
