@@ -6,6 +6,7 @@ A grid that does not pass is refused by `pipeline`: rather no result than a wron
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -27,7 +28,7 @@ from .handles import false_struts
 from .hanging import hanging_nodes, nodes_off_sheets
 from .irregular import count_irregular
 from .left_out import asked_for, closed_holes, first_and_more, parts_left_out, without_caps
-from .limits import NOISES_OFF, limits_of, mostly_rounded, places_to_look_at, widened_limits
+from .limits import LIMBS_KEPT, NOISES_OFF, limits_of, mostly_rounded, places_to_look_at, widened_limits
 from .missed import farthest_followed, largest_patch_missed, points_missed, share_rounded
 from .openings import boundary_faults
 from .sheets import cut_apart, faults_on_sheets, nodes_of_samples
@@ -44,7 +45,6 @@ if TYPE_CHECKING:
 
 # distance within which a point of the scan and a triangle are in reach of each other [member lengths]
 COVER_REACH = 0.5
-
 FAULTS_NAMED = 3  # faults that a refusal names
 MOST_ACCEPTED = 0.3  # share of the scan that is missed above which no refusal names the setting that accepts it
 
@@ -211,14 +211,20 @@ def passed_grid(grid: Grid) -> Grid:
     CertificateError
         It does not pass. Names the first place of a fault.
     """
-    certificate = grid.certificate
-    if certificate is None or certificate.passed:
+    if grid.certificate is None or grid.certificate.passed:
         return grid
+    raise refusal_of(grid)
+
+
+def refusal_of(grid: Grid, complete: Callable[[], CertificateError] | None = None) -> CertificateError:
+    """Return why a grid does not pass; `complete` makes the same with the whole certificate, where the grid has only its faults."""
+    certificate = grid.certificate
+    assert certificate is not None
     words = _listed([fault.words for fault in certificate.faults[:FAULTS_NAMED]])
     more = len(certificate.faults) - FAULTS_NAMED
     words += f", and has {more} other {'fault' if more == 1 else 'faults'}" if more > 0 else ""
     where = next((fault.where for fault in certificate.faults if fault.where), None)
-    raise CertificateError(f"the grid {words}; {_way_out(certificate)}", grid, where)
+    return CertificateError(f"the grid {words}; {_way_out(certificate)}", grid, where, complete)
 
 
 def _listed(words: list[str]) -> str:
@@ -229,8 +235,9 @@ def _listed(words: list[str]) -> str:
 def _way_out(found: Certificate) -> str:
     """Return what gives a grid all the same: the setting that accepts what is wrong if that alone is, else `--keep-failed`."""
     kinds = {fault.kind for fault in found.faults}
+    limbs = sum(part.share for part in found.left_out if part.kind == "limbs") > 0.5 * found.missing
     if kinds == {"cover"} and found.missing > MOST_ACCEPTED:
-        return "choose the part that is wanted with --crop or --piece; --keep-failed gives it all the same"
+        return f"{LIMBS_KEPT if limbs else 'choose the part that is wanted with --crop or --piece'}; --keep-failed gives it all the same"
     if kinds <= {"unfollowed", "rounded"}:
         return "shorter members follow it; --keep-failed gives it all the same"
     if kinds == {"sparse"}:
@@ -240,7 +247,7 @@ def _way_out(found: Certificate) -> str:
     if "hanging" in kinds:
         return "--crop or --piece leaves out what lies off the surface, shorter members keep to it; --keep-failed gives it all the same"
     if kinds == {"cover"} and found.missing > 0.0:
-        return f"--allow-missing {math.ceil(100.0 * found.missing) / 100.0:g} accepts that"
+        return f"{f'{LIMBS_KEPT}, ' * limbs}--allow-missing {math.ceil(100.0 * found.missing) / 100.0:g} accepts that"
     return "--keep-failed gives it all the same"
 
 

@@ -27,6 +27,8 @@ HEXAGON_BOUNDARY = 3.0**0.5  # members of the boundary of even hexagons [desired
 WARN_FOLD = 45.0  # angle between neighbouring triangles below which the fold is poor [degree]
 WARN_OFFSET = 0.05  # distance of a node from the scan, beyond its noise, from which on that is poor [member lengths]
 NOISES_OFF = 3.0  # rms distances of points from their plane that are noise
+# what keeps limbs that are left out as too thin
+LIMBS_KEPT = "shorter members keep limbs, which must be three of them round"
 PLACES_KEPT = 30  # places of a fault that are kept, the worst first
 ROUNDED_BY = 0.25  # distance from the grid above which a point is rounded off [member lengths]
 # share of the points that are rounded off above which it is a fault: 0.23 where nodes jump between two layers, 0.16 at most on others

@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from ..attempts.looks import has_one_lattice
+from ..attempts.table import Attempt
+from ..errors import FrontError, InputError
+from ..pipeline import first_that_passes
+
 if TYPE_CHECKING:
-    from ..errors import FrontError
     from ..grid.grid import Grid
+    from ..runtime.progress import Progress
+    from ..scan.cloud import PointCloud
+    from ..settings import Settings
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,3 +60,15 @@ class LengthTrial:
             part.kind in ("hole", "gap") and not part.asked and (part.size or 0.0) > self.length
             for part in found.left_out
         )
+
+
+def settled(trial: LengthTrial, cloud: PointCloud, settings: Settings, progress: Progress) -> LengthTrial:
+    """Return what comes of a length at which no quick run passes if it is begun as `grid` begins, where that is with more fronts."""
+    usual = settings.replace(effort="normal")
+    if trial.passed or trial.paused or trial.loses_limbs:
+        return trial
+    with suppress(FrontError, InputError):
+        if not has_one_lattice(cloud, usual):
+            grid = first_that_passes(cloud, usual, [Attempt(usual, is_trial=True)], progress=progress)
+            return replace(trial, grid=grid, fault=None)
+    return trial
