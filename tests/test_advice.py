@@ -13,15 +13,19 @@ import numpy as np
 import pytest
 from marks import compiled_only
 from shapes import make
+from small_clouds import ball, sheet
 from typed import known
 
 import scantruss as st
 from scantruss import pipeline
+from scantruss.attempts.limit import AttemptLimit
 from scantruss.attempts.table import Attempt
 from scantruss.cli.main import main
+from scantruss.errors import FrontError
 from scantruss.grid.certificate import Certificate, Fault, LeftOut
-from scantruss.report.advice import LEAST_TRIED, MOST_TRIED, SURE_PER_SPACING, TRIED_AROUND, Advice
-from scantruss.report.length_trial import LengthTrial
+from scantruss.report.advice import Advice
+from scantruss.report.ladder import HOPELESS_NEARBY, LEAST_TRIED, MOST_TRIED, SURE_PER_SPACING, TRIED_AROUND
+from scantruss.report.length_trial import LengthTrial, settled
 from scantruss.report.lengths import advice_lines, advice_rows, result_of
 from scantruss.scan.member_length import length_range, round_length, suggest_length
 from scantruss.surface.samples import SurfaceSamples
@@ -236,7 +240,7 @@ def test_a_suggestion_and_its_table_cost_no_more_than_so_many_grids_and_points(
     assert "no length passes of those tried" in capsys.readouterr().out
     assert sum(max(1.0, (usual / length) ** 2) for length in made) <= MOST_TRIED + TRIED_AROUND
     made = counted_runs(monkeypatch, lambda length: False)
-    monkeypatch.setattr("scantruss.report.advice.POINTS_LOOKED_AT", 1)
+    monkeypatch.setattr("scantruss.report.ladder.POINTS_LOOKED_AT", 1)
     Advice(cloud_of("limpet"), st.Settings(length=1.0)).suggest()
     assert 1 <= len(made) <= LEAST_TRIED
 
@@ -469,3 +473,58 @@ def test_the_next_longer_length_is_tried_before_that_of_a_thin_wall_takes_all_gr
     counted_runs(monkeypatch, lambda length: 1.3 * wall < length < 1.5 * wall)
     advice = Advice(cloud, st.Settings(length=1.0))
     assert 1.3 * wall < advice.suggest() < 1.5 * wall and advice.passes
+
+
+def test_no_length_nearby_is_longer_than_one_whose_limbs_are_too_thin(monkeypatch: pytest.MonkeyPatch) -> None:
+    part: Any = SimpleNamespace(kind="limbs", share=0.3)
+    found = SimpleNamespace(
+        faults=[SimpleNamespace(kind="cover")],
+        missing=0.3,
+        left_out=(part,),
+        crossings=0,
+        boundary_loops=0,
+        scan_loops=0,
+    )
+    fault = st.CertificateError("leaves out 30 %", cast(Any, SimpleNamespace(certificate=found, cells="triangle")))
+    tried: list[float] = []
+
+    def refuse(cloud: st.PointCloud, settings: st.Settings, *_: Any, limit: AttemptLimit, **__: Any) -> st.Grid:
+        tried.append(settings.length)
+        limit.begin()
+        raise FrontError("no")
+
+    monkeypatch.setattr("scantruss.report.advice.first_that_passes", refuse)
+    advice = Advice(st.PointCloud.from_array(sheet(12, 12, 0.1)), st.Settings(length=1.0))
+    assert advice.nearby(1.0, fault) is None
+    assert tried and max(tried) < 1.0
+
+
+def test_no_other_length_nearby_is_tried_after_four_without_hope(monkeypatch: pytest.MonkeyPatch) -> None:
+    found = SimpleNamespace(
+        faults=[SimpleNamespace(kind="manifold")],
+        missing=0.0,
+        left_out=(),
+        crossings=50,
+        boundary_loops=0,
+        scan_loops=0,
+    )
+    fault = st.CertificateError("is not manifold", cast(Any, SimpleNamespace(certificate=found, cells="triangle")))
+    tried: list[float] = []
+
+    def refuse(cloud: st.PointCloud, attempt: Attempt, **_: Any) -> st.Grid:
+        tried.append(attempt.settings.length)
+        raise fault
+
+    monkeypatch.setattr("scantruss.pipeline.make_grid", refuse)
+    monkeypatch.setattr("scantruss.pipeline.make_grid_with_wide_ridges", refuse)
+    cloud = st.PointCloud.from_array(sheet(12, 12, 0.1))
+    assert Advice(cloud, st.Settings(length=1.0)).nearby(0.5) is None
+    assert len(set(tried)) == HOPELESS_NEARBY
+
+
+def test_a_length_at_which_no_quick_run_passes_is_begun_as_grid_begins() -> None:
+    cloud = st.PointCloud.from_array(ball(5.0, 4000))
+    settings = st.Settings(length=2.0, effort="quick")
+    failed = LengthTrial(2.0, None, FrontError("no"), 3)
+    assert settled(failed, cloud, settings, lambda *_: None).passed
+    assert settled(replace(failed, paused=True), cloud, settings, lambda *_: None).fault is failed.fault

@@ -161,3 +161,43 @@ def test_ridges_are_given_up_right_after_the_fault_and_the_first_fault_counts(mo
     assert len(made) == len(list(attempts(cloud, asked))) + 2
     with pytest.raises(FrontError, match=r"fault 1$"):
         course.outcome()
+
+
+def refused(kind: str) -> st.CertificateError:
+    """Return why a grid is refused whose fault is of a kind."""
+    found = SimpleNamespace(
+        faults=[SimpleNamespace(kind=kind)], missing=0.0, left_out=(), crossings=0, boundary_loops=0, scan_loops=0
+    )
+    return st.CertificateError(f"fault {kind}", cast(Any, SimpleNamespace(certificate=found, cells="triangle")))
+
+
+def test_what_fails_by_its_one_front_is_not_made_again_with_less_effort(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Attempt, "after", lambda *_: None)
+    cloud, asked = st.PointCloud.from_array(CLOUDS["cap"][0]), st.Settings(length=1.0)
+    for kind, again in (("torn", False), ("manifold", False), ("short", True)):
+        course = AttemptCourse(cloud, asked)
+        made = driven(course, dict.fromkeys(NAMES, refused(kind)))
+        once = [each for each in made if each.settings.effort == "normal"]
+        less = {(each.row, each.starts) for each in made[len(once) :]}
+        assert all(((each.row, each.starts) in less) == again for each in once if each.has_one_front(cloud))
+        assert all((each.row, each.starts) in less for each in once if not each.has_one_front(cloud))
+        assert any(each.has_one_front(cloud) for each in once)
+        with pytest.raises(st.CertificateError, match=f"fault {kind}"):
+            course.outcome()
+
+
+def test_a_refusal_has_the_whole_certificate_and_others_are_not_made() -> None:
+    made: list[str] = []
+
+    def whole(name: str) -> st.CertificateError:
+        made.append(name)
+        return st.CertificateError(f"whole {name}", light.grid)
+
+    light = refused("short")
+    faults = [st.CertificateError(name, light.grid, None, lambda name=name: whole(name)) for name in ("one", "two")]  # type: ignore[misc]
+    course = AttemptCourse(st.PointCloud.from_array(sheet(8, 8, 0.25)), st.Settings(length=1.0, effort="quick"))
+    for number, attempt in enumerate(course):
+        course.failed(attempt, faults[min(number, 1)])
+    with pytest.raises(st.CertificateError, match="whole one") as raised:
+        course.outcome()
+    assert made == ["one"] and raised.value.whole is raised.value

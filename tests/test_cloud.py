@@ -15,6 +15,7 @@ from scipy.spatial import cKDTree
 
 from scantruss.errors import InputError
 from scantruss.kernels.geometry.bounds import POINTS_PER_BLOCK, move_points, widen_bounds
+from scantruss.report.figures import cloud_lines
 from scantruss.scan import cloud as clouds
 from scantruss.scan.cloud import PointCloud, bounds_of, measure_spacing
 
@@ -290,3 +291,10 @@ def test_the_bounds_of_a_cloud_are_those_of_its_points() -> None:
     points = np.random.default_rng(2).random((500, 3)) * [1.0, 300.0, 7.0] + [4.5e5, 5.4e6, 100.3]
     cloud = PointCloud.from_array(points)
     assert (cloud.bounds[0] == cloud.points.min(axis=0)).all() and (cloud.bounds[1] == cloud.points.max(axis=0)).all()
+
+
+def test_the_extent_is_without_points_far_away() -> None:
+    points = np.concatenate([bowl(2000), [[9000.0, 0.0, 0.0], [0.0, 7000.0, 0.0]]])
+    extent = cloud_lines(PointCloud.from_array(points))[1]
+    assert "without 2 points far away" in extent and float(extent.split()[1]) < 100.1
+    assert "far away" not in cloud_lines(PointCloud.from_array(points[:-2]))[1]

@@ -13,7 +13,7 @@ from hypothesis import strategies as some
 from rough import rough_disc, rough_sphere, strip_of
 from small_grids import dome, fan, icosahedron, make_grid, two_pieces
 
-from scantruss import Grid
+from scantruss import Grid, InputError
 from scantruss.report.figures import count_holes
 
 CHECK = Path(__file__).resolve().parents[2] / "shared" / "check"
@@ -134,3 +134,10 @@ def test_figures_agree_with_the_check_beside_the_repository(name: str, monkeypat
         assert ours == pytest.approx(theirs[key], abs=1e-9), key
     for key in ("components", "boundary_loops", "euler", "manifold"):
         assert getattr(topology, key) == theirs[key], key
+
+
+def test_the_name_of_a_file_is_no_cloud_to_plot() -> None:
+    grid = fan()
+    for draw, instead in ((grid.plot, r'plot\(\).save\("grid.png"\)'), (grid.show, "scantruss.write")):
+        with pytest.raises(InputError, match=f"got a str; {instead}"):
+            draw("grid.png")  # type: ignore[arg-type]

@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from .attempts.looks import VERY_ROUGH_SCAN
-from .errors import FrontError
+from .errors import CertificateError, FrontError
 from .front.advance import advance_front
 from .front.orientation_field import Field, FieldStart, orientation_fields
 from .improve.candidate import Candidate, grid_of, judged, misses_at_most
@@ -292,7 +292,10 @@ def optimize_fronts(
         No grid passes; the fault of the first.
     """
     improved = improve_fronts(fronts, samples, boundary, constraints, settings, progress=progress)
-    return best_that_passes(improved, samples, boundary, constraints, settings, progress=progress)
+    try:
+        return best_that_passes(improved, samples, boundary, constraints, settings, progress=progress)
+    except CertificateError as refused:
+        raise refused.whole from None
 
 
 def _part(progress: Progress | None, stage: str, begin: float, end: float) -> Callable[[float], None] | None:

@@ -15,7 +15,8 @@ A message says what was got, what is needed and what to do, in one line.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from functools import cached_property
 from typing import Any
 
 
@@ -100,7 +101,25 @@ def unit_words(unit: str, power: int = 1) -> str:
 
 
 class CertificateError(FrontError):
-    """A grid has come out that fails its certificate."""
+    """A grid has come out that fails its certificate.
+
+    While others are tried the certificate says only what is wrong with the grid; `whole` has all that it says.
+    """
+
+    def __init__(
+        self,
+        message: str,
+        grid: Any = None,
+        where: tuple[float, float, float] | None = None,
+        complete: Callable[[], CertificateError] | None = None,
+    ) -> None:
+        super().__init__(message, grid, where)
+        self._complete = complete
+
+    @cached_property
+    def whole(self) -> CertificateError:
+        """The same with the whole certificate, which is made when it is first asked for."""
+        return self if self._complete is None else self._complete()
 
 
 class FormatError(ScanTrussError):

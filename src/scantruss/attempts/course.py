@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from ..check.limits import with_ridges_given_up, with_ridges_lost
 from ..errors import CertificateError, FrontError, OneSidedError, ScanTrussError
-from .limit import AttemptLimit, joins_sheets, loses_limbs, only_leaves_out
+from .limit import AttemptLimit, fails_by_front, joins_sheets, loses_limbs, only_leaves_out
 from .looks import breaks_limb, runs_along_rods, stands_on_columns
 from .lost_ridges import lost_ridges
 from .table import attempts
@@ -33,7 +33,8 @@ class AttemptCourse:
     - `RIDGES_GIVEN_UP`: an attempt fails near ridges; each gives up one place more at least, of `FAULTS_WITHOUT_RIDGES`.
     - `WITHOUT_RODS`: a grid passes but runs along rods; once, as the last attempt. That with fewer warnings is taken, or that without
       them where they are columns of a shell: a grid around some of them is no part of it.
-    - least effort: none passes, and sheets are not too near each other; all attempts again, once: more effort never gives less.
+    - least effort: none passes, and sheets are not too near each other; all attempts again, once: more effort never gives less. Those
+      are left out that fail by their one front, which is the same with any effort, or by the limbs that were cut off before it.
 
     Parameters
     ----------
@@ -64,6 +65,7 @@ class AttemptCourse:
         self._follows: Attempt | None = None  # what is put in next
         self._row_begun: Attempt | None = None  # the attempt of the table that those put in follow
         self._first_fault: FrontError | None = None  # of that attempt
+        self._fails_by_front = True  # whether that attempt and all that followed it do
         self._passed: Grid | None = None
         self._around_columns = False  # whether that is a grid around columns
 
@@ -84,17 +86,20 @@ class AttemptCourse:
         attempt = self._next_listed()
         if attempt is None and self._tries_least_effort():
             settings = self._settings.replace(effort=LEAST_EFFORT)
-            self._begin(settings, attempts(self._cloud, settings), AttemptLimit())
+            self._begin(settings, attempts(self._cloud, settings), AttemptLimit(self._limit))
             attempt = self._next_listed()
         return attempt
 
     def _next_listed(self) -> Attempt | None:
         """Return the next attempt of the list that is worth making."""
-        if not self._limit.any_left():
-            return None
-        attempt = next(filter(self._limit.allows, self._tried), None)
-        self._row_begun, self._first_fault = attempt, None
-        return attempt
+        # ends: the list does
+        while self._limit.any_left() and (attempt := next(filter(self._limit.allows, self._tried), None)) is not None:
+            self._row_begun, self._first_fault, self._fails_by_front = attempt, None, True
+            if (fault := self._limit.known_fault(attempt)) is None:
+                return attempt
+            self._limit.begin()
+            self._note(attempt, fault)
+        return None
 
     def _tries_least_effort(self) -> bool:
         """Whether all attempts are made once more; where they are, what refuses the grid is noted."""
@@ -134,6 +139,7 @@ class AttemptCourse:
         ScanTrussError
             The fault, where it is one of the settings that were asked for.
         """
+        self._fails_by_front &= fails_by_front(fault)
         if isinstance(fault, FrontError):
             self._limit.end(fault)
             self._first_fault = self._first_fault or fault
@@ -157,6 +163,8 @@ class AttemptCourse:
             self._faults.append(fault)
         self._advice = self._advice or attempt.advice(fault)
         self._limit.note(attempt, fault)
+        if self._fails_by_front and attempt.has_one_front(self._cloud):
+            self._limit.note_front(attempt, fault)
 
     def outcome(self) -> Grid:
         """Return the grid that passes.
@@ -176,7 +184,7 @@ class AttemptCourse:
         """Return why no grid passes with the effort that was tried last."""
         if not self._faults:
             return FrontError("none of the attempts made gives a grid that passes")
-        worst = next((fault for fault in self._faults if isinstance(fault, CertificateError)), self._faults[0])
+        worst = next((fault.whole for fault in self._faults if isinstance(fault, CertificateError)), self._faults[0])
         if self._advice and isinstance(worst, FrontError) and not only_leaves_out(worst):
             return type(worst)(f"{worst}; {self._advice}", worst.grid, worst.where)
         return worst

@@ -22,13 +22,26 @@ MOST_FAR_OF_BODY = 1
 # by how much more than may be missing is cut off where no front leaves out less: some follows the ends of a limb a little farther
 LIMBS_BY_FRONT = 1.1
 # settings by which limbs are cut off, and what may be left of them, beside how far the samples are apart
+FAULTS_OF_FRONTS = {"manifold", "orientable", "pieces", "loops", "torn"}  # kinds of faults that no search changes
 CUTS_BY = ("limb_girth", "keep_rods", "judge_outliers", "smooth_scale", "thin_walls", "sharp_edges", "plain_body")
 
 
 def only_leaves_out(fault: ScanTrussError) -> TypeGuard[CertificateError]:
     """Whether a grid only leaves out too much of the scan."""
-    found = fault.grid.certificate if isinstance(fault, CertificateError) else None
-    return found is not None and {each.kind for each in found.faults} == {"cover"}
+    if not isinstance(fault, CertificateError) or _kinds_of(fault) != {"cover"}:
+        return False
+    return _kinds_of(fault.whole) == {"cover"}
+
+
+def _kinds_of(fault: CertificateError) -> set[str]:
+    """Return of which kinds the faults of a grid are."""
+    found = fault.grid.certificate if fault.grid is not None else None
+    return set() if found is None else {each.kind for each in found.faults}
+
+
+def fails_by_front(fault: ScanTrussError) -> bool:
+    """Whether a grid hangs together as its scan does not: as its front has left it, and no search changes that."""
+    return isinstance(fault, CertificateError) and bool(_kinds_of(fault) & FAULTS_OF_FRONTS)
 
 
 def joins_sheets(fault: ScanTrussError | None) -> bool:
@@ -56,13 +69,25 @@ class AttemptLimit:
     After two in a row that come nowhere near a grid that passes, others of the same settings would come no nearer; after three
     such settings none would. A scan that looks one-sided may only be rough: then its mean surface is not. How much is tried is
     counted in grids that are made, not in seconds: the same scan gets the same result.
+
+    Parameters
+    ----------
+    earlier : AttemptLimit, optional
+        Of the same attempts with more effort. What less effort leaves as it was is not made again: which limbs are cut off, and
+        how a grid hangs together.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, earlier: AttemptLimit | None = None) -> None:
         self._allowed = MOST_RUNS
         self._far: list[tuple[Settings, int]] = []  # settings, and how many attempts in a row were far from passing
         self._given_up = self._of_cells = 0
-        self._losing_limbs: list[Settings] = []  # settings with which more is cut off than may be missing
+        self.all_hopeless = True  #: whether all grids that were made are far from passing, or fail by their fronts
+        # settings with which more is cut off than may be missing
+        self._losing_limbs: list[Settings] = [] if earlier is None else earlier._losing_limbs
+        self._failing_by_front: list[
+            tuple[Attempt, ScanTrussError]
+        ] = []  # attempts of one front that no search makes pass
+        self._known_to_fail = [] if earlier is None else earlier._failing_by_front
         self.runs, self._looks_one_sided = 0, False  #: grids that were made
 
     def allow(self, more: int) -> None:
@@ -101,12 +126,30 @@ class AttemptLimit:
         """Return how many attempts of some settings, one after the other, were far from passing."""
         return next((count for known, count in self._far if known == settings), 0)
 
+    def known_fault(self, attempt: Attempt) -> ScanTrussError | None:
+        """Return why an attempt fails with more effort that fails with this one too; None where that is not known."""
+        own = attempt.settings
+        return next(
+            (
+                fault
+                for known, fault in self._known_to_fail
+                if known.starts == attempt.starts and known.settings.replace(effort=own.effort) == own
+            ),
+            None,
+        )
+
+    def note_front(self, attempt: Attempt, fault: ScanTrussError) -> None:
+        """Note why an attempt of one front, and what followed it, failed by that front."""
+        self._failing_by_front.append((attempt, fault))
+
     def note(self, attempt: Attempt, fault: ScanTrussError) -> None:
         """Note what has come of an attempt."""
         self._looks_one_sided |= isinstance(fault, OneSidedError)
         if loses_limbs(attempt.settings, fault):
             self._losing_limbs.append(attempt.settings)
-        far = self._far_in_a_row(attempt.settings) + 1 if _is_far_from_passing(attempt, fault) else 0
+        is_far = _is_far_from_passing(attempt, fault)
+        self.all_hopeless &= is_far or fails_by_front(fault)
+        far = self._far_in_a_row(attempt.settings) + 1 if is_far else 0
         self._far = [pair for pair in self._far if pair[0] != attempt.settings] + [(attempt.settings, far)]
         self._given_up += far == MOST_FAR and not attempt.settings.smooth_scale  # of those there are four
         if far == MOST_FAR and joins_sheets(fault):

@@ -83,14 +83,6 @@ class AskedScan:
         samples = sample_surface(self.cloud, self.asked.replace(plain_body=True))
         return samples.measured < len(samples.surface.mean)
 
-    def has_one_lattice(self, settings: Settings) -> bool:
-        """Whether even effort `normal` begins from one lattice only, so that another one may fit where that does not."""
-        if settings.method != "default" or settings.rows_along:
-            return False
-        usual = settings.replace(effort="normal")
-        starts = usual_starts(sample_surface(self.cloud, usual), usual)
-        return len(starts) == 1 and starts[0].laid
-
     @cached_property
     def has_limbs_cut_off(self) -> bool:
         """Whether limbs are cut off."""
@@ -131,6 +123,15 @@ class AskedScan:
     def is_smooth(self, settings: Settings) -> bool:
         """Whether the scan is so smooth that its samples lie farther apart than on others."""
         return self.by_default and bool(sample_surface(self.cloud, settings).smooth)
+
+
+def has_one_lattice(cloud: PointCloud, settings: Settings) -> bool:
+    """Whether even effort `normal` begins from one lattice only, so that another one may fit where that does not."""
+    if settings.method != "default" or settings.rows_along:
+        return False
+    usual = settings.replace(effort="normal")
+    starts = usual_starts(sample_surface(cloud, usual), usual)
+    return len(starts) == 1 and starts[0].laid
 
 
 def runs_along_rods(grid: Grid, cloud: PointCloud, settings: Settings, asked: Settings) -> bool:

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 from ..boundary.find import find_boundary
 from ..cells.make import settings_of_triangles
-from ..check.certify import MOST_ACCEPTED
+from ..check.refusal import MOST_ACCEPTED
 from ..constraints.find import ridges_away_from, ridges_given_up
-from ..errors import words_of_place
+from ..errors import CertificateError, words_of_place
 from ..front.orientation_field import FieldStart
 from ..settings import SAMPLE_SPACING
 from ..surface.samples import sample_surface
 from .limit import FAR_MISSING, only_leaves_out
-from .looks import ROUGH_SCAN, VERY_ROUGH_SCAN, AskedScan
+from .looks import ROUGH_SCAN, VERY_ROUGH_SCAN, AskedScan, has_one_lattice
 
 if TYPE_CHECKING:
     import numpy as np
@@ -60,15 +60,17 @@ class Attempt:
 
     def after(self, fault: FrontError, cloud: PointCloud) -> Attempt | None:
         """The same attempt with the ridges given up where it failed; None where that is not known or no ridge is near."""
+        follows = self.settings.ridge_angle > 0.0 and self.settings.method == "default" and self.starts is None
+        if not follows or len(self.faults) >= FAULTS_WITHOUT_RIDGES or not (followed := self.ridge_points(cloud)):
+            return None
+        if isinstance(fault, CertificateError):
+            fault = fault.whole
         found = fault.grid.certificate if fault.grid is not None else None
         places = [each.where for each in found.faults if each.where] if found is not None else []
         places += [fault.where] if fault.where else []
         new = tuple(dict.fromkeys(place for place in places if place not in self.faults))
-        follows = self.settings.ridge_angle > 0.0 and self.settings.method == "default" and self.starts is None
-        if not new or not follows or len(self.faults) >= FAULTS_WITHOUT_RIDGES:
-            return None
         later = replace(self, faults=self.faults + new)
-        return later if later.ridge_points(cloud) < self.ridge_points(cloud) else None
+        return later if new and later.ridge_points(cloud) < followed else None
 
     def ridge_points(self, cloud: PointCloud) -> int:
         """Return by how many points the ridges go that this attempt follows."""
@@ -84,11 +86,15 @@ class Attempt:
         samples, _ = find_boundary(sample_surface(cloud, settings), settings)
         return ridges_given_up(self.faults, samples, settings, self.wide)
 
+    def has_one_front(self, cloud: PointCloud) -> bool:
+        """Whether it has one front, the same with any effort."""
+        return self.starts is not None or has_one_lattice(cloud, self.settings)
+
     def advice(self, fault: ScanTrussError) -> str:
         """Say with which settings a grid passes that only leaves out too much: of the mean surface, or without thin limbs; else nothing."""
         if not only_leaves_out(fault):
             return ""
-        found = fault.grid.certificate
+        found = fault.whole.grid.certificate
         allowing = f"--allow-missing {math.ceil(100.0 * found.missing) / 100.0:g}"
         if self.settings.smooth_scale and found.missing <= MOST_ACCEPTED:
             smooth = f"--smooth-scale {self.settings.smooth_scale:g} --ridge-angle 0"
@@ -160,7 +166,7 @@ ROWS_TRIED: tuple[AttemptRow, ...] = (
     AttemptRow("hall without its columns", ALL_LAYOUTS, lambda scan, now: scan.stands_on_rods, {"keep_rods": False}),
     AttemptRow("thin walls", FIRST_TWO_LAYOUTS, lambda scan, now: scan.has_thin_walls, {"thin_walls": True}),
     AttemptRow("front without rows", SECOND_LAYOUT),
-    AttemptRow("rows turned", TURNED_ROWS, lambda scan, now: scan.has_one_lattice(now)),
+    AttemptRow("rows turned", TURNED_ROWS, lambda scan, now: has_one_lattice(scan.cloud, now)),
     # where edges, limbs or slits are in the way, other fronts seldom help
     AttemptRow("sharp edges", FIRST_LAYOUT, lambda scan, now: scan.has_sharp_edges, {"sharp_edges": True}),
     AttemptRow("plain body", FIRST_LAYOUT, lambda scan, now: scan.has_plain_body, {"plain_body": True}),

@@ -5,13 +5,11 @@ A grid that does not pass is refused by `pipeline`: rather no result than a wron
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import CertificateError
 from ..grid.certificate import Certificate, Fault, Spread, Worst, place_of
 from ..runtime.parallel import side_by_side
 from ..surface.chosen_samples import KEPT, OUTLIER
@@ -31,6 +29,7 @@ from .left_out import asked_for, closed_holes, first_and_more, parts_left_out, w
 from .limits import COVER_REACH, limits_of, mostly_rounded, places_to_look_at, widened_limits
 from .missed import farthest_followed, largest_patch_missed, points_missed, shares_rounded
 from .openings import boundary_faults
+from .refusal import passed_grid
 from .sheets import cut_apart, faults_on_sheets, nodes_of_samples
 from .slits import feet_on, narrow_gaps
 from .sparse import sparse_parts
@@ -42,9 +41,6 @@ if TYPE_CHECKING:
     from ..grid.grid import Grid
     from ..settings import Settings
     from ..surface.samples import SurfaceSamples
-
-FAULTS_NAMED = 3  # faults that a refusal names
-MOST_ACCEPTED = 0.3  # share of the scan that is missed above which no refusal names the setting that accepts it
 
 
 def certify(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings: Settings) -> Certificate:
@@ -202,47 +198,6 @@ def checked(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings: S
 def certified(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings: Settings) -> Grid:
     """Return the grid with its certificate: rather no result than a wrong one that looks right; see `passed_grid`."""
     return passed_grid(checked(grid, samples, boundary, settings))
-
-
-def passed_grid(grid: Grid) -> Grid:
-    """Return a grid whose certificate passes.
-
-    Raises
-    ------
-    CertificateError
-        It does not pass. Names the first place of a fault.
-    """
-    certificate = grid.certificate
-    if certificate is None or certificate.passed:
-        return grid
-    words = _listed([fault.words for fault in certificate.faults[:FAULTS_NAMED]])
-    more = len(certificate.faults) - FAULTS_NAMED
-    words += f", and has {more} other {'fault' if more == 1 else 'faults'}" if more > 0 else ""
-    where = next((fault.where for fault in certificate.faults if fault.where), None)
-    raise CertificateError(f"the grid {words}; {_way_out(certificate)}", grid, where)
-
-
-def _listed(words: list[str]) -> str:
-    """Return what is wrong as one part of a sentence."""
-    return ", ".join(words[:-1]) + f" and {words[-1]}" if len(words) > 1 else words[0]
-
-
-def _way_out(found: Certificate) -> str:
-    """Return what gives a grid all the same: the setting that accepts what is wrong if that alone is, else `--keep-failed`."""
-    kinds = {fault.kind for fault in found.faults}
-    if kinds == {"cover"} and found.missing > MOST_ACCEPTED:
-        return "choose the part that is wanted with --crop or --piece; --keep-failed gives it all the same"
-    if kinds <= {"unfollowed", "rounded"}:
-        return "shorter members follow it; --keep-failed gives it all the same"
-    if kinds == {"sparse"}:
-        return "longer members cover it, --allow-missing accepts more of the scan missing"
-    if kinds <= {"beyond", "bridged"}:
-        return "shorter members keep to it, --crop leaves out what lies beyond it; --keep-failed gives it all the same"
-    if "hanging" in kinds or kinds == {"spike"}:
-        return "--crop or --piece leaves out what lies off the surface, shorter members keep to it; --keep-failed gives it all the same"
-    if kinds == {"cover"} and found.missing > 0.0:
-        return f"--allow-missing {math.ceil(100.0 * found.missing) / 100.0:g} accepts that"
-    return "--keep-failed gives it all the same"
 
 
 def _topology(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings: Settings) -> Certificate:

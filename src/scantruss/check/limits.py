@@ -27,6 +27,8 @@ HEXAGON_BOUNDARY = 3.0**0.5  # members of the boundary of even hexagons [desired
 WARN_FOLD = 45.0  # angle between neighbouring triangles below which the fold is poor [degree]
 WARN_OFFSET = 0.05  # distance of a node from the scan, beyond its noise, from which on that is poor [member lengths]
 NOISES_OFF = 3.0  # rms distances of points from their plane that are noise
+# what keeps limbs that are left out as too thin
+LIMBS_KEPT = "shorter members keep limbs, which must be three of them round"
 PLACES_KEPT = 30  # places of a fault that are kept, the worst first
 # distance within which a point of the scan and a triangle are in reach of each other [member lengths]
 COVER_REACH = 0.5

@@ -173,7 +173,7 @@ def grid_with_notes(
             note_pieces(bars, cloud, settings)
             from .floors import words_of_floor
 
-            lead = words_of_floor(bars, cloud, settings) or nearby_words(bars, cloud, settings, advice)
+            lead = words_of_floor(bars, cloud, settings) or nearby_words(bars, cloud, settings, advice, error)
             words = f"{error}{lead}"
             raise type(error)(words, error.grid, error.where) from None
     made = grid.settings or settings
@@ -243,7 +243,9 @@ def choose_length(cloud: PointCloud, settings: Settings, bars: Bars) -> tuple[Se
     return settings.replace(length=length), advice
 
 
-def nearby_words(bars: Bars, cloud: PointCloud, settings: Settings, advice: Advice | None = None) -> str:
+def nearby_words(
+    bars: Bars, cloud: PointCloud, settings: Settings, advice: Advice | None = None, refused: FrontError | None = None
+) -> str:
     """Name the nearest length at which a grid passes, tried by quick runs; nothing if lengths vary over the scan."""
     from ..report.advice import Advice
 
@@ -253,7 +255,7 @@ def nearby_words(bars: Bars, cloud: PointCloud, settings: Settings, advice: Advi
     if advice is not None and advice.tried and not advice.passes:
         lengths = f"{advice.tried[0].length:g} to {advice.tried[-1].length:g}{unit}"
         return f"; no grid passes with the lengths tried, {lengths}, either: clean or crop the scan where it fails"
-    if (length := Advice(cloud, settings, bars).nearby(settings.length)) is not None:
+    if (length := Advice(cloud, settings, bars).nearby(settings.length, refused)) is not None:
         return f"; a grid passes with --length {length:g} ({f'{cloud.unit}, ' if cloud.unit else ''}tried with --effort quick)"
     return (
         f"; no grid passes with the lengths tried near {settings.length:g}{unit} either: scantruss info looks for one farther off,"

@@ -226,6 +226,10 @@ def note_compiling(bars: Bars) -> Iterator[None]:
     """Report, once a run, that kernels are being compiled, which takes long."""
     from ..runtime.jit import KERNEL_FOLDER, report_compiling
 
-    words = "compiling kernels, once on this machine" if KERNEL_FOLDER else "compiling kernels"
+    words = (
+        "compiling kernels that no run has used yet, each once on this machine"
+        if KERNEL_FOLDER
+        else "compiling kernels"
+    )
     with report_compiling(lambda: bars.note_once(words)):
         yield

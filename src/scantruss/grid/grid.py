@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import words_of_number
+from ..errors import InputError, words_of_number
 from .line_sets import LineSet
 from .panels import CELL_NAMES
 from .quality import GridQuality, measure_quality
@@ -119,6 +119,7 @@ class Grid(GridTables):
         size : tuple of int, optional
             Width and height [pixel].
         """
+        _check_cloud(cloud, 'plot().save("grid.png") writes a picture')
         pictures = import_module("scantruss.export.drawing.picture")  # a layer above this one
         image: Image = pictures.plot_grid(self, cloud, (view,) if isinstance(view, str) else tuple(view), size)
         return image
@@ -131,6 +132,7 @@ class Grid(GridTables):
         cloud : PointCloud, optional
             The scan, drawn with it.
         """
+        _check_cloud(cloud, 'scantruss.write(grid, "grid.html") writes a page')
         return import_module("scantruss.export.page").view_of_grid(self, cloud)  # a layer above this one
 
     @cached_property
@@ -142,3 +144,15 @@ class Grid(GridTables):
     def topology(self) -> Topology:
         """Components, boundary loops, Euler number, manifold, orientable."""
         return measure_topology(self)
+
+
+def _check_cloud(cloud: Any, instead: str) -> None:
+    """Refuse what is no cloud, such as the name of a file.
+
+    Raises
+    ------
+    InputError
+        It says what writes a file instead.
+    """
+    if cloud is not None and not hasattr(cloud, "points"):
+        raise InputError(f"cloud must be the PointCloud of the scan, got a {type(cloud).__name__}; {instead}")

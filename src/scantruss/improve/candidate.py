@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from ..check.certify import Judged, judge, passed_grid
+from ..check.certify import Judged, judge
+from ..check.refusal import passed_grid, refusal_of
 from ..errors import FrontError
 from .equalize import energy_of_node
 from .rings import finish_rings
@@ -60,9 +61,12 @@ class Candidate:
         self.judged, self.grid = judged, judged.checked_grid
 
     def end(self) -> None:
-        """Make the whole certificate of the grid taken, and refuse it if it does not pass."""
-        assert self.judged is not None
-        self.grid = passed_grid(self.judged.certified_grid())
+        """Make the whole certificate of the grid taken, and refuse it if it does not pass; at once where its faults are known."""
+        judged = self.judged
+        assert judged is not None
+        if not judged.certificate.passed:
+            raise refusal_of(judged.checked_grid, lambda: refusal_of(judged.certified_grid()))
+        self.grid = passed_grid(judged.certified_grid())
 
     @property
     def passes(self) -> bool:

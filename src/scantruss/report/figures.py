@@ -12,6 +12,7 @@ from ..errors import words_of_count, words_of_number, words_of_place
 from ..grid.certificate import near
 from ..grid.line_sets import FIXED_LINE, RIDGE, sets_of
 from ..kernels.geometry.components import component_labels
+from ..scan.checks import usual_extent
 
 if TYPE_CHECKING:
     from ..boundary.find import Boundary
@@ -247,12 +248,13 @@ def cloud_lines(cloud: PointCloud) -> list[str]:
 
     low, high = length_range(cloud)
     unit = f" {cloud.unit}" if cloud.unit else ""
-    extent = " x ".join(words_of_number(side, 4) for side in np.ptp(cloud.points, axis=0))
-    lowest = [f"{value:.10g}" for value in cloud.origin + cloud.points.min(axis=0)]
+    bulk, far = _bulk(cloud)
+    extent = " x ".join(words_of_number(side, 4) for side in np.ptp(bulk, axis=0))
+    lowest = [f"{value:.10g}" for value in cloud.origin + bulk.min(axis=0)]
     lines = [
         f"points   {len(cloud.points)}"
         + (f" ({cloud.dropped} more left out: NaN or infinite)" if cloud.dropped else ""),
-        f"extent   {extent}{unit}, from {' '.join(lowest)}",
+        f"extent   {extent}{unit}, from {' '.join(lowest)}{far}",
         f"spacing  {words_of_number(cloud.spacing, 4)}{unit}",
         f"unit     {cloud.unit or 'not known; give it with --unit mm|cm|m|inch|foot'}",
     ]
@@ -264,6 +266,15 @@ def cloud_lines(cloud: PointCloud) -> list[str]:
     else:
         lines.append(f"length   {low:g} to {high:g}{unit}")
     return lines
+
+
+def _bulk(cloud: PointCloud) -> tuple[np.ndarray, str]:
+    """Return the points without a few so far away that they are none of the scan, and how many these are, in words."""
+    if cloud.usual_extent == cloud.extent:
+        return cloud.points, ""
+    low, high = usual_extent(cloud.points)
+    kept = (np.abs(cloud.points - 0.5 * (low + high)) <= high - low).all(axis=1)
+    return cloud.points[kept], f", without {words_of_count(int((~kept).sum()), 'point')} far away"
 
 
 def surface_lines(cloud: PointCloud, samples: SurfaceSamples) -> list[str]:

@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
+
+from ..attempts.looks import has_one_lattice
+from ..attempts.table import Attempt
+from ..errors import FrontError, InputError
+from ..pipeline import first_that_passes
+
+if TYPE_CHECKING:
+    from ..grid.grid import Grid
+    from ..runtime.progress import Progress
+    from ..scan.cloud import PointCloud
+    from ..settings import Settings
 
 # kinds of warnings of what shorter members may follow
 CRUSHED_OR_LOST = ("crushed", "lost")
-
-if TYPE_CHECKING:
-    from ..errors import FrontError
-    from ..grid.grid import Grid
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,3 +69,15 @@ class LengthTrial:
             for part in found.left_out
         )
         return 2 * closes_openings + any(warning.kind in CRUSHED_OR_LOST for warning in found.warnings)
+
+
+def settled(trial: LengthTrial, cloud: PointCloud, settings: Settings, progress: Progress) -> LengthTrial:
+    """Return what comes of a length at which no quick run passes if it is begun as `grid` begins, where that is with more fronts."""
+    usual = settings.replace(effort="normal")
+    if trial.passed or trial.paused or trial.loses_limbs:
+        return trial
+    with suppress(FrontError, InputError):
+        if not has_one_lattice(cloud, usual):
+            grid = first_that_passes(cloud, usual, [Attempt(usual, is_trial=True)], progress=progress)
+            return replace(trial, grid=grid, fault=None)
+    return trial

@@ -22,6 +22,7 @@ def advice_rows(advice: Advice, length: float, cloud: PointCloud) -> tuple[tuple
     rows: list[tuple[str, ...]] = []
     advice.try_length(length)
     trials: dict[float, LengthTrial | None] = dict.fromkeys(advice.around(length))
+    advice.settle()
     trials |= {trial.length: trial for trial in advice.tried}
     for each in sorted(trials):
         trial = trials[each]
@@ -69,7 +70,7 @@ def result_of(trial: LengthTrial | None) -> str:
 def _no_grid(trial: LengthTrial) -> str:
     """Say that no grid passes, or that those do not that were made."""
     if not trial.paused:
-        return "no grid passes"
+        return "no quick run passes"
     return f"none of the first {trial.grids} grids passes" if trial.grids > 1 else "the first grid does not pass"
 
 
@@ -101,7 +102,7 @@ def advice_lines(advice: Advice, length: float, cloud: PointCloud) -> list[str]:
         passing = [each.length for each in advice.tried if each.passed]
         near = min(passing, key=lambda other: abs(np.log(other / length)), default=None)
         near = advice.nearby(length) if near is None and not advice.is_spent else near
-        lines += [f"at {length:g}{unit}: no grid passes: {_why(trial)}{place}"]
+        lines += [f"at {length:g}{unit}: {_no_grid(trial)}: {_why(trial)}{place}"]
         lines += [f"try --length {near:g}" if near else "no length passes of those tried; clean or crop the scan first"]
     else:
         lines.append(f"try --length {length:g}")

@@ -1,0 +1,47 @@
+"""Which member lengths are tried in which order, and how many grids that may cost."""
+
+from __future__ import annotations
+
+# grids that are made of a length before others are tried: where many are to be tried, usually, and when it is tried again
+FIRST_TWO, A_FEW, SOME_MORE = 2, 4, 8
+#: lengths to try in turn after the usual one, as multiples of it, with how many grids are made of each
+LONGER_FIRST = (
+    (1.4, A_FEW), (2.0, A_FEW), (2.8, A_FEW), (1 / 1.4, A_FEW), (2.0, SOME_MORE), (1.4, SOME_MORE), (1.0, SOME_MORE),
+    (2.8, SOME_MORE), (0.5, A_FEW),
+)  # fmt: skip
+#: the same where the usual one passes, or leaves out much: members are too long for thin parts rather than too short
+SHORTER_FIRST = (
+    (1 / 1.4, A_FEW), (1.4, A_FEW), (1.0, SOME_MORE), (0.5, A_FEW), (2.0, A_FEW), (1 / 1.4, SOME_MORE), (1.4, SOME_MORE),
+    (2.8, A_FEW), (2.0, SOME_MORE),
+)  # fmt: skip
+LAST_LENGTHS = (1.4, 2.0, 2.8)  # lengths that are tried where none has passed, as multiples of the usual one
+NEARLY_NEXT = 1.45  # ratio of lengths that pass up to which the longer one stands for the next to the shorter
+LINES_OF_A_SCANNER = 5  # fewest lines of points that may be those of a scanner
+NEXT_LENGTH = 1.4  # a length is suggested if that many times it passes too
+SAME_LENGTH = 1.08  # ratio of lengths up to which what has come of one stands for the other
+# lengths that are tried in place of one that failed
+NEARBY_LENGTHS = (1.12, 0.9, 1.25, 0.8, 1.4, 0.7, 1.7, 0.6, 2.0, 0.5, 2.8)
+# spacings in a member from which holes in the sampling are seldom taken for holes of the surface
+SURE_PER_SPACING = 8.0
+LENGTH_OF_WALL = 0.8  # of the thickness of a wall: at 1.4 times that, too, both of its sides are kept apart
+MOSTLY_WALL = 0.4  # share of a scan on a thin wall from which on lengths are chosen for that
+LEAST_OF_WALL = 5.0  # least length for a wall, in spacings
+LOST_ALIKE = 0.002  # share of the scan up to which lengths lose as much as one another
+MOST_LOST = 0.01  # share of the scan that may be lost at a length that is suggested
+MOST_TRIED = 20.0  # grids that are made for a suggestion, or to find a length nearby, each counted by its cost
+POINTS_LOOKED_AT = 2_000_000  # points that are looked at for that
+LEAST_TRIED = 5.0  # grids that are made for that even where the scan has more points
+TRIED_AROUND = 6.0  # grids that are made besides for the lengths of the table, one each
+TRIED_LONGER = 2  # grids that are made of each longer length where no other has passed, of those for the table
+BESIDE_USUAL = (
+    1.12,
+    0.9,
+    1.25,
+)  # lengths that are tried then where none of these passes, as multiples of the usual one
+TRIED_USUAL = 4.0  # grids that are made at the usual length where no length nearby passes and it is far away
+FAR_TOO_SHORT = 0.2  # share of the shortest possible length below which the usual one is looked at alone: that length is in another unit
+POINTS_PER_MEMBER = 9  # points that cost as much as a member of the grid
+MOST_MEMBERS = 60_000  # members of a grid that is made to try a length
+CLOSE_BEND = 0.95  # share of the scan that is less bent than the radius that is named
+# lengths one after the other, all of whose grids are far from passing or fail by their fronts, after which no other nearby is tried
+HOPELESS_NEARBY = 4
