@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 import scantruss as st
 from scantruss.attempts.table import attempts
+from scantruss.constraints.ridges import find_ridges
 from scantruss.kernels.geometry.boxes import new_boxes
 from scantruss.kernels.surface.samples import put_all
 from scantruss.kernels.surface.sides import vote_on_sides
@@ -64,6 +65,17 @@ def test_thin_walls_are_tried_where_there_are_some() -> None:
     plate = np.random.default_rng(0).random((4_000, 3)) * (12.0, 12.0, 0.02)
     settings = st.Settings(length=1.0)
     assert not any(attempt.settings.thin_walls for attempt in attempts(st.PointCloud.from_array(plate), settings))
+
+
+def test_the_lip_of_a_wall_of_a_third_of_a_member_is_one_line_along_its_middle() -> None:
+    """It is so narrow that one or two samples lie on it at a place: it was no ridge, and a zigzag."""
+    settings = st.Settings(length=1.4, thin_walls=True)
+    samples, _ = st.find_boundary(st.sample_surface(st.PointCloud.from_array(pot()[0]), settings), settings)
+    (lip,) = (ridge for ridge in find_ridges(samples, settings) if ridge.lip)
+    places = lip.places + samples.origin
+    assert lip.ring
+    assert np.abs(np.linalg.norm(places[:, :2], axis=1) - RADIUS).max() < 0.5 * WALL
+    assert np.abs(places[:, 2] - HEIGHT - 0.5 * WALL).max() < 0.5 * WALL
 
 
 @compiled_only
