@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 from marks import compiled_only
 from numpy.typing import NDArray
 
 import scantruss as st
+from scantruss.attempts.looks import follows_more
 from scantruss.attempts.table import attempts
 from scantruss.constraints.ridges import find_ridges
 from scantruss.kernels.geometry.boxes import new_boxes
@@ -85,6 +89,17 @@ def test_a_pot_with_a_wall_of_a_third_of_a_member_gets_a_grid() -> None:
     assert (grid.topology.boundary_loops, grid.topology.euler, grid.topology.components) == (2, 0, 1)
     inner = np.linalg.norm((grid.nodes + grid.origin)[:, :2], axis=1) < RADIUS
     assert inner.sum() > 50  # it is lined with a grid inside as well
+
+
+@pytest.mark.parametrize(
+    ("p95", "warnings", "is_taken"), [(0.5, 2, True), (0.5, 3, False), (0.9, 2, False), (0.9, 1, True)]
+)
+def test_the_grid_of_both_sides_is_taken_where_it_follows_more(p95: float, warnings: int, is_taken: bool) -> None:
+    def found(distance: float, count: int) -> Any:
+        certificate = SimpleNamespace(missing=0.0, warnings=count * [None], scan_distance=SimpleNamespace(p95=distance))
+        return SimpleNamespace(certificate=certificate)
+
+    assert follows_more(found(p95, warnings), found(1.0, 2)) == is_taken
 
 
 @pytest.mark.kernels

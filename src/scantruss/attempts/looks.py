@@ -179,11 +179,11 @@ def jumps_between_walls(grid: Grid, cloud: PointCloud, asked: Settings) -> bool:
 
 
 def follows_more(grid: Grid, other: Grid) -> bool:
-    """Whether a grid is plainly nearer to its scan than another one, or as near with fewer warnings; both have certificates."""
+    """Whether a grid is plainly nearer to its scan than another one without more warnings, or as near with fewer; both have certificates."""
     found, known = grid.certificate, other.certificate
     if found is None or known is None or found.scan_distance is None or known.scan_distance is None:
         return False
-    if found.missing > known.missing + MISSING_ALIKE:
+    if found.missing > known.missing + MISSING_ALIKE or len(found.warnings) > len(known.warnings):
         return False
     if found.scan_distance.p95 < PLAINLY_NEARER * known.scan_distance.p95:
         return True
