@@ -179,7 +179,7 @@ def jumps_between_walls(grid: Grid, cloud: PointCloud, asked: Settings) -> bool:
 
 
 def follows_more(grid: Grid, other: Grid) -> bool:
-    """Whether a grid is plainly nearer to its scan than another one without more warnings, or as near with fewer; both have certificates."""
+    """Whether a grid is plainly nearer to its scan than another one without more warnings, or as near with fewer; both are certified."""
     found, known = grid.certificate, other.certificate
     if found is None or known is None or found.scan_distance is None or known.scan_distance is None:
         return False
