@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 from marks import compiled_only
 from numpy.typing import NDArray
 
 import scantruss as st
+from scantruss.attempts.looks import follows_more
 from scantruss.attempts.table import attempts
+from scantruss.constraints.ridges import find_ridges
 from scantruss.kernels.geometry.boxes import new_boxes
 from scantruss.kernels.surface.samples import put_all
 from scantruss.kernels.surface.sides import vote_on_sides
@@ -66,6 +71,17 @@ def test_thin_walls_are_tried_where_there_are_some() -> None:
     assert not any(attempt.settings.thin_walls for attempt in attempts(st.PointCloud.from_array(plate), settings))
 
 
+def test_the_lip_of_a_wall_of_a_third_of_a_member_is_one_line_along_its_middle() -> None:
+    """It is so narrow that one or two samples lie on it at a place: it was no ridge, and a zigzag."""
+    settings = st.Settings(length=1.4, thin_walls=True)
+    samples, _ = st.find_boundary(st.sample_surface(st.PointCloud.from_array(pot()[0]), settings), settings)
+    (lip,) = (ridge for ridge in find_ridges(samples, settings) if ridge.lip)
+    places = lip.places + samples.origin
+    assert lip.ring
+    assert np.abs(np.linalg.norm(places[:, :2], axis=1) - RADIUS).max() < 0.5 * WALL
+    assert np.abs(places[:, 2] - HEIGHT - 0.5 * WALL).max() < 0.5 * WALL
+
+
 @compiled_only
 def test_a_pot_with_a_wall_of_a_third_of_a_member_gets_a_grid() -> None:
     grid = st.grid_from_points(pot()[0], st.Settings(length=1.4, effort="quick"))
@@ -73,6 +89,17 @@ def test_a_pot_with_a_wall_of_a_third_of_a_member_gets_a_grid() -> None:
     assert (grid.topology.boundary_loops, grid.topology.euler, grid.topology.components) == (2, 0, 1)
     inner = np.linalg.norm((grid.nodes + grid.origin)[:, :2], axis=1) < RADIUS
     assert inner.sum() > 50  # it is lined with a grid inside as well
+
+
+@pytest.mark.parametrize(
+    ("p95", "warnings", "is_taken"), [(0.5, 2, True), (0.5, 3, False), (0.9, 2, False), (0.9, 1, True)]
+)
+def test_the_grid_of_both_sides_is_taken_where_it_follows_more(p95: float, warnings: int, is_taken: bool) -> None:
+    def found(distance: float, count: int) -> Any:
+        certificate = SimpleNamespace(missing=0.0, warnings=count * [None], scan_distance=SimpleNamespace(p95=distance))
+        return SimpleNamespace(certificate=certificate)
+
+    assert follows_more(found(p95, warnings), found(1.0, 2)) == is_taken
 
 
 @pytest.mark.kernels

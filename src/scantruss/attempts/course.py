@@ -9,20 +9,24 @@ from typing import TYPE_CHECKING
 from ..check.limits import with_ridges_given_up, with_ridges_lost
 from ..errors import CertificateError, FrontError, OneSidedError, ScanTrussError
 from .limit import AttemptLimit, fails_by_front, joins_sheets, loses_limbs, only_leaves_out
-from .looks import breaks_limb, runs_along_rods, stands_on_columns
+from .looks import breaks_limb, follows_more, jumps_between_walls, runs_along_rods, stands_on_columns
 from .lost_ridges import lost_ridges
-from .table import attempts
+from .table import AS_ASKED, SECOND_LAYOUT, Attempt, attempts, layouts_of
 
 if TYPE_CHECKING:
     from ..grid.grid import Grid
     from ..scan.cloud import PointCloud
     from ..settings import Settings
-    from .table import Attempt
 
 LEAST_EFFORT = "quick"
 WITHOUT_RODS = "passes, but along rods: without them"
+BETWEEN_WALLS = "passes, but jumps between thin walls: with their sides distinguished"
 BREAKS_LIMB = "the grid is torn at a limb thinner than its members"
 RIDGES_GIVEN_UP = "ridges given up near the faults"
+TRIED_BEFORE_WALLS = (
+    AS_ASKED,
+    RIDGES_GIVEN_UP,
+)  # rows of grids that pass before the sides of walls were ever distinguished
 
 
 class AttemptCourse:
@@ -33,6 +37,8 @@ class AttemptCourse:
     - `RIDGES_GIVEN_UP`: an attempt fails near ridges; each gives up one place more at least, of `FAULTS_WITHOUT_RIDGES`.
     - `WITHOUT_RODS`: a grid passes but runs along rods; once, as the last attempt. That with fewer warnings is taken, or that without
       them where they are columns of a shell: a grid around some of them is no part of it.
+    - `BETWEEN_WALLS`: the first grid passes but may jump between the sides of thin walls; once, as the last attempt. That which follows
+      more of the scan is taken.
     - least effort: none passes, and sheets are not too near each other; all attempts again, once: more effort never gives less. Those
       are left out that fail by their one front, which is the same with any effort, or by the limbs that were cut off before it.
 
@@ -118,6 +124,10 @@ class AttemptCourse:
         given_up = attempt.ridges_given_up(self._cloud)
         lost = lost_ridges(grid, self._cloud, self._settings, given_up)
         grid = with_ridges_lost(with_ridges_given_up(grid, given_up), lost)
+        if attempt.row == BETWEEN_WALLS:
+            assert self._passed is not None
+            self._passed = grid if follows_more(grid, self._passed) else self._passed
+            return
         if self._passed is not None:  # this one is without rods
             assert grid.certificate is not None and self._passed.certificate is not None
             fewer = len(grid.certificate.warnings) < len(self._passed.certificate.warnings)
@@ -129,6 +139,10 @@ class AttemptCourse:
             without = self._row_begun.settings.replace(keep_rods=False)
             self._follows = replace(self._row_begun, settings=without, row=WITHOUT_RODS)
             self._first_fault = None
+        elif attempt.row in TRIED_BEFORE_WALLS and jumps_between_walls(grid, self._cloud, self._settings):
+            self._follows = Attempt(
+                self._settings.replace(thin_walls=True), is_trial=attempt.is_trial, row=BETWEEN_WALLS
+            )
         self._passed = grid
 
     def failed(self, attempt: Attempt, fault: ScanTrussError) -> None:
@@ -139,6 +153,10 @@ class AttemptCourse:
         ScanTrussError
             The fault, where it is one of the settings that were asked for.
         """
+        if attempt.row == BETWEEN_WALLS:
+            if attempt.starts is None:  # once more, with a front that makes all of its nodes itself
+                self._follows = replace(attempt, starts=layouts_of(attempt.settings)[SECOND_LAYOUT][0])
+            return
         self._fails_by_front &= fails_by_front(fault)
         if isinstance(fault, FrontError):
             self._limit.end(fault)

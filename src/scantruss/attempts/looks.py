@@ -30,6 +30,17 @@ MANY_OUTLIERS = 0.002  # share of the points that must be outliers for a grid to
 SAID_BESIDE_RODS = ("aside", "far", "peak")  # kinds of warnings of a grid that runs along rods, or misses them
 THIN_WALL, SOME_WALLS = 0.8, 0.05  # thickness of a thin wall [member lengths], and share of the places that have one
 ROUGH_AS_WALLS = 0.5  # share of its roughness that is left at most where the sides of walls are distinguished
+MISSED_LAYER = (
+    "unfollowed",
+    "peak",
+    "rounded",
+    "offset",
+    "far",
+    "missed",
+)  # kinds of warnings of a grid that jumps between walls
+# share of the distance within which a twentieth of the points is not, down to which a grid follows a scan plainly better than another
+PLAINLY_NEARER = 0.75
+MISSING_ALIKE = 0.005  # share of the scan by which a grid may miss more than another and still follow it as far
 BESIDE_RODS = 0.5  # distance from a rod within which the place of a warning is beside it [member lengths]
 # by how much nearer a hundredth of the points must lie, in members, where members are unevener by 1 (std of their lengths / mean)
 NEARER_FOR_UNEVENER = 2.0
@@ -156,6 +167,28 @@ def runs_along_rods(grid: Grid, cloud: PointCloud, settings: Settings, asked: Se
     return bool(len(rods)) and any(
         bool((np.linalg.norm(rods - place, axis=1) < BESIDE_RODS * settings.length).any()) for place in places
     )
+
+
+def jumps_between_walls(grid: Grid, cloud: PointCloud, asked: Settings) -> bool:
+    """Whether a grid that passes, with warnings, may run from one side of thin walls to the other, or miss one."""
+    found = grid.certificate
+    return (
+        found is not None
+        and any(warning.kind in MISSED_LAYER for warning in found.warnings)
+        and AskedScan(cloud, asked).has_thin_walls
+    )
+
+
+def follows_more(grid: Grid, other: Grid) -> bool:
+    """Whether a grid is plainly nearer to its scan than another one without more warnings, or as near with fewer; both are certified."""
+    found, known = grid.certificate, other.certificate
+    if found is None or known is None or found.scan_distance is None or known.scan_distance is None:
+        return False
+    if found.missing > known.missing + MISSING_ALIKE or len(found.warnings) > len(known.warnings):
+        return False
+    if found.scan_distance.p95 < PLAINLY_NEARER * known.scan_distance.p95:
+        return True
+    return found.scan_distance.p95 <= known.scan_distance.p95 and len(found.warnings) < len(known.warnings)
 
 
 def breaks_limb(grid: Grid, cloud: PointCloud, asked: Settings, settings: Settings) -> Place | None:

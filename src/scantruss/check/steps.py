@@ -73,7 +73,7 @@ def unfollowed_steps(
     long = words_of_number(sizes[lines[0][0]], 3)
     words = (
         f"does not follow {several} {long}{unit} long, such as a beam, a rib or a fin: the points there lie"
-        f" up to {words_of_number(step[worst].max(), 3)}{unit} apart in height"
+        f" up to {words_of_number(step[worst].max(), 3)}{unit} apart across the grid"
     )
     at, *others = (place_of(place) for place in places[worst] + samples.origin)
     return [Fault("unfollowed", words, at, tuple(others))]

@@ -179,11 +179,11 @@ def grid_with_notes(
     made = grid.settings or settings
     smoothed = made.smooth_scale != settings.smooth_scale
     if smoothed:
-        note_smoothed(bars, grid)
+        note_smoothed(bars, cloud, settings, grid)
     for name, words in {
         "judge_outliers": "no grid passes with the outliers of this scan, so they are left out, as with --judge-outliers always",
         "sharp_edges": "no grid passes without a look at the sharp edges of this body, so it is made as with --sharp-edges",
-        "thin_walls": "no grid passes without a closer look at the sides of the walls of this scan, so it is made as with --thin-walls",
+        "thin_walls": "the walls of this scan are thinner than a member, so the grid is made of both of their sides, as with --thin-walls",
         "plain_body": "no grid passes with all thin limbs and slits of this body, so it is made without, as with --plain-body",
         "keep_rods": "a grid with the columns, scaffold or cables of this scan fails or misses them: what was found of them is left out",
         "limb_girth": f"no grid passes with all thin limbs cut off, so it is made as with --limb-girth {made.limb_girth:g}",
@@ -216,15 +216,17 @@ def words_of_symmetry(rows: Sequence[Sequence[float]]) -> str:
     return f"symmetric in {len(rows)} mirror plane{'s' * (len(rows) != 1)}, as point and normal: {words}"
 
 
-def note_smoothed(bars: Bars, grid: Grid) -> None:
-    """Report that a rough scan was smoothed, and how far that has taken the nodes from its points."""
+def note_smoothed(bars: Bars, cloud: PointCloud, settings: Settings, grid: Grid) -> None:
+    """Report that a rough scan, or one of thin walls, was smoothed, and how far that has taken the nodes from its points."""
     from ..report.figures import offset_words
+    from ..surface.samples import sample_surface
 
     assert grid.settings is not None and grid.certificate is not None
     scale = grid.settings.smooth_scale
+    what = "both sides of the thin walls" if sample_surface(cloud, settings).layers[1] > 0.0 else "the roughness"
     words = "a member" if scale == 1.0 else f"{scale:g} members"
     bars.note(
-        f"no grid follows the roughness of this scan, so it is smoothed over {words}, as with --smooth-scale {scale:g}"
+        f"no grid follows {what} of this scan, so it is smoothed over {words}, as with --smooth-scale {scale:g}"
         f" --ridge-angle 0: nodes lie on the mean surface; points around nodes: {offset_words(grid.certificate)}"
     )
 

@@ -37,6 +37,9 @@ SIDES_CANCEL = 0.7  # length of the mean normal below which the sides turn by mo
 FACES_OUT = 0.5  # least cosine of the angle between the normals of a crest and the direction in which it points
 HALF_OF_FOLD = 0.5  # the fold turns from so far on one side to so far on the other [member lengths]
 FEWEST_OF_SIDE, FEWEST_OF_CREST = 4, 4  # samples
+SIDES_TURN_BACK = math.radians(
+    125.0
+)  # turn from which on one sample of the crest is enough: the lip of a thin wall has room for no more
 SEARCHES_OF_CREST = 4  # how often the line is moved to where both sides meet
 FARTHEST_SHIFT = 0.3  # at most so far each time [member lengths]
 SHARE_OF_DIAGONAL = 1e-9  # added to the normal equations of the crest, which a straight row of samples leaves open
@@ -151,7 +154,7 @@ def fit_wide_fold(surface: Surface, sample: int, place: Vector, towards: Vector,
             elif SIDES_FROM < w < SIDES_TO:
                 beside = u if dot(m, n) > FACES_OUT else dot(m, c) * outwards
                 add_sample(sums[0 if beside < 0.0 else 1], w - HALF_OF_FOLD, math.atan2(dot(m, c), dot(m, n)), u, h)
-        if min(sums[0].count, sums[1].count) < FEWEST_OF_SIDE or crest[0, 0] < FEWEST_OF_CREST:
+        if min(sums[0].count, sums[1].count) < FEWEST_OF_SIDE or crest[0, 0] < 1.0:
             return False
         fit_side(sums[0], -1.0, side[0])
         fit_side(sums[1], 1.0, side[1])
@@ -159,6 +162,8 @@ def fit_wide_fold(surface: Surface, sample: int, place: Vector, towards: Vector,
             crest[r, r] += SHARE_OF_DIAGONAL * crest[0, 0]
         # a normal at angle a from n towards c is that of the line (u - u0) sin a + (h - h0) cos a = 0
         left, right = side[0].angle, side[1].angle
+        if crest[0, 0] < FEWEST_OF_CREST and abs(right - left) < SIDES_TURN_BACK:
+            return False
         apart = math.sin(right) - math.sin(left)
         if apart == 0.0 or not solve_normal_equations(crest, TERMS_OF_CREST):
             return False
