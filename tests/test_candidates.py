@@ -321,7 +321,10 @@ def test_fronts_that_would_all_miss_the_same_limbs_are_not_tried() -> None:
 
     def fault(kind: str) -> st.CertificateError:
         part: Any = SimpleNamespace(kind=kind, share=0.06)
-        found = SimpleNamespace(missing=0.06, left_out=(part,), crossings=0, boundary_loops=1, scan_loops=1)
+        wrong: Any = SimpleNamespace(kind="cover")
+        found = SimpleNamespace(
+            missing=0.06, faults=(wrong,), left_out=(part,), crossings=0, boundary_loops=1, scan_loops=1
+        )
         return st.CertificateError("the grid leaves out 6 %", cast(Any, SimpleNamespace(certificate=found)))
 
     for kind, tried in (("limbs", False), ("far", True)):
