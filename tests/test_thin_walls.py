@@ -11,7 +11,7 @@ from marks import compiled_only
 from numpy.typing import NDArray
 
 import scantruss as st
-from scantruss.attempts.looks import follows_more
+from scantruss.attempts.looks import follows_more, jumps_between_walls
 from scantruss.attempts.table import attempts
 from scantruss.constraints.ridges import find_ridges
 from scantruss.kernels.geometry.boxes import new_boxes
@@ -100,6 +100,17 @@ def test_the_grid_of_both_sides_is_taken_where_it_follows_more(p95: float, warni
         return SimpleNamespace(certificate=certificate)
 
     assert follows_more(found(p95, warnings), found(1.0, 2)) == is_taken
+
+
+@compiled_only
+def test_noise_is_not_taken_for_walls() -> None:
+    cloud, settings = st.PointCloud.from_array(pot()[0]), st.Settings(length=1.4)
+
+    def passing(noise: float) -> Any:
+        return SimpleNamespace(certificate=SimpleNamespace(noise=noise, warnings=[SimpleNamespace(kind="rounded")]))
+
+    assert jumps_between_walls(passing(0.01), cloud, settings)
+    assert not jumps_between_walls(passing(0.06), cloud, settings)
 
 
 @pytest.mark.kernels

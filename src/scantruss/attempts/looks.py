@@ -38,6 +38,7 @@ MISSED_LAYER = (
     "far",
     "missed",
 )  # kinds of warnings of a grid that jumps between walls
+NOISE_AS_WALLS = 0.025  # noise from which on it looks like walls: at walls it is 0.01 at most [member lengths]
 # share of the distance within which a twentieth of the points is not, down to which a grid follows a scan plainly better than another
 PLAINLY_NEARER = 0.75
 MISSING_ALIKE = 0.005  # share of the scan by which a grid may miss more than another and still follow it as far
@@ -174,6 +175,7 @@ def jumps_between_walls(grid: Grid, cloud: PointCloud, asked: Settings) -> bool:
     found = grid.certificate
     return (
         found is not None
+        and found.noise < NOISE_AS_WALLS * asked.length
         and any(warning.kind in MISSED_LAYER for warning in found.warnings)
         and AskedScan(cloud, asked).has_thin_walls
     )
