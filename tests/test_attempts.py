@@ -174,7 +174,7 @@ def refused(kind: str) -> st.CertificateError:
 def test_what_fails_by_its_one_front_is_not_made_again_with_less_effort(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(Attempt, "after", lambda *_: None)
     cloud, asked = st.PointCloud.from_array(CLOUDS["cap"][0]), st.Settings(length=1.0)
-    for kind, again in (("torn", False), ("manifold", False), ("short", True)):
+    for kind, again in (("torn", True), ("manifold", False), ("short", True)):
         course = AttemptCourse(cloud, asked)
         made = driven(course, dict.fromkeys(NAMES, refused(kind)))
         once = [each for each in made if each.settings.effort == "normal"]
