@@ -199,7 +199,8 @@ def test_of_many_small_holes_the_largest_are_listed_and_the_others_counted() -> 
     stray = replace(certificate, left_out=(LeftOut("outliers", 500, 0.02), *closed), points=25_000)
     (line,) = first_line(stray)  # a hole has no points that could be missing
     assert (
-        line.startswith("2.0% of the scan, 500 of 25,000 points, is not in the grid: outliers") and "hole" not in line
+        line.startswith("2.0% of the scan, 500 of 25,000 points, is not in the grid: set aside as outliers")
+        and "hole" not in line
     )
 
 

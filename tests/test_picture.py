@@ -173,7 +173,7 @@ def test_what_the_grid_leaves_out_is_coloured_and_named_and_outliers_do_not_shri
     cloud = st.PointCloud.from_array(near)
     shown = shown_points(grid, cloud)
     kinds = {part.words.split(": ")[1] for part in shown.missed}
-    assert any(word.startswith(("outliers", "farther than a member")) for word in kinds)
+    assert any(word.startswith(("set aside as outliers", "farther than a member")) for word in kinds)
     total = len(shown.followed) + sum(len(part.points) for part in shown.missed)
     assert total == len(near)
     bare, full = (pixels(encode_picture(grid, c)) for c in (st.PointCloud.from_array(points), cloud))

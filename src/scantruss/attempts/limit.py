@@ -81,7 +81,9 @@ class AttemptLimit:
         self._allowed = MOST_RUNS
         self._far: list[tuple[Settings, int]] = []  # settings, and how many attempts in a row were far from passing
         self._given_up = self._of_cells = 0
-        self.all_hopeless = True  #: whether all grids that were made are far from passing, or fail by their fronts
+        self._hopes: list[
+            bool
+        ] = []  # for each fault that was noted, whether it is neither far from passing nor the front's
         # settings with which more is cut off than may be missing
         self._losing_limbs: list[Settings] = [] if earlier is None else earlier._losing_limbs
         self._failing_by_front: list[
@@ -105,6 +107,11 @@ class AttemptLimit:
     def _is_hopeful(self) -> bool:
         """Whether any attempt is worth making."""
         return self._given_up < MOST_GIVEN_UP and self._of_cells < MOST_RUNS_OF_CELLS
+
+    @property
+    def all_hopeless(self) -> bool:
+        """Whether grids were made, and all are far from passing, or fail by their fronts."""
+        return bool(self._hopes) and not any(self._hopes)
 
     def begin(self) -> None:
         """Note that a grid is made."""
@@ -148,7 +155,7 @@ class AttemptLimit:
         if loses_limbs(attempt.settings, fault):
             self._losing_limbs.append(attempt.settings)
         is_far = _is_far_from_passing(attempt, fault)
-        self.all_hopeless &= is_far or fails_by_front(fault)
+        self._hopes.append(not is_far and not fails_by_front(fault))
         far = self._far_in_a_row(attempt.settings) + 1 if is_far else 0
         self._far = [pair for pair in self._far if pair[0] != attempt.settings] + [(attempt.settings, far)]
         self._given_up += far == MOST_FAR and not attempt.settings.smooth_scale  # of those there are four

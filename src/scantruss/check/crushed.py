@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..grid.certificate import Fault, place_of
+from ..surface.chosen_samples import LIMB, SLIT
 from .gaps import by_x, points_within
 from .hanging import axes_of_nodes
 from .limits import NOISES_OFF, PLACES_KEPT
@@ -58,7 +59,7 @@ def _crushed_nodes(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the nodes (K,) that are pointed though the points around them lie off the grid, the most of them first, and their axes (K, 3).
 
-    Nodes of ridges and of the boundary are none.
+    Nodes of ridges and of the boundary are none, and those where a limb was cut off.
     """
     desired = np.full(len(grid.nodes), length) if grid.desired is None else grid.desired
     axes = axes_of_nodes(grid)[3]
@@ -69,14 +70,14 @@ def _crushed_nodes(
     if not len(candidates):
         return candidates, axes[candidates]
     order = np.argsort(samples.scan[:, 0], kind="stable")
-    points, away = samples.scan[order], found.scan[order]
+    points, away, is_cut = samples.scan[order], found.scan[order], np.isin(samples.judged[order], (LIMB, SLIT))
     noise = NOISES_OFF * float(np.median(found.noise))
     share = np.zeros(len(grid.nodes))
     for node in candidates.tolist():
         place, reach = grid.nodes[node], AROUND_POINTED * desired[node]
         first, last = np.searchsorted(points[:, 0], (place[0] - reach, place[0] + reach))
         around = ((points[first:last] - place) ** 2).sum(axis=1) < reach**2
-        if around.sum() >= FEWEST_AT_POINT:
+        if around.sum() >= FEWEST_AT_POINT and not is_cut[first:last][around].any():
             share[node] = np.mean(away[first:last][around] > OFF_AT_POINT * desired[node] + noise)
     crushed = np.flatnonzero(share > MOSTLY_OFF)
     crushed = crushed[np.argsort(-share[crushed], kind="stable")]
