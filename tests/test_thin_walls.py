@@ -17,6 +17,7 @@ from scantruss.constraints.ridges import find_ridges
 from scantruss.kernels.geometry.boxes import new_boxes
 from scantruss.kernels.surface.samples import put_all
 from scantruss.kernels.surface.sides import vote_on_sides
+from scantruss.settings import SAMPLE_SPACING
 from scantruss.surface.samples import sample_surface
 
 RADIUS, WALL, HEIGHT, DEPTH = (
@@ -62,10 +63,13 @@ def test_without_a_closer_look_they_do_not() -> None:
 
 
 def test_thin_walls_are_tried_where_there_are_some() -> None:
-    found = [
-        attempt.settings.thin_walls for attempt in attempts(st.PointCloud.from_array(pot()[0]), st.Settings(length=1.4))
-    ]
-    assert found[:4] == [False, True, True, False]
+    """At close samples first, then at the usual ones, which a side with few points needs; with those alone where it is asked for."""
+    cloud, asked = st.PointCloud.from_array(pot()[0]), st.Settings(length=1.4)
+    found = [(attempt.settings.thin_walls, attempt.settings.box_size) for attempt in attempts(cloud, asked)]
+    close, usual = (True, asked.box_size), (True, SAMPLE_SPACING)
+    assert found[:6] == [(False, asked.box_size), close, close, usual, usual, (False, asked.box_size)]
+    again = [attempt.settings.box_size for attempt in attempts(cloud, asked.replace(thin_walls=True))]
+    assert again[:3] == [asked.box_size, SAMPLE_SPACING, SAMPLE_SPACING]
     plate = np.random.default_rng(0).random((4_000, 3)) * (12.0, 12.0, 0.02)
     settings = st.Settings(length=1.0)
     assert not any(attempt.settings.thin_walls for attempt in attempts(st.PointCloud.from_array(plate), settings))

@@ -165,6 +165,12 @@ ROWS_TRIED: tuple[AttemptRow, ...] = (
     AttemptRow(AS_ASKED, FIRST_LAYOUT),
     AttemptRow("hall without its columns", ALL_LAYOUTS, lambda scan, now: scan.stands_on_rods, {"keep_rods": False}),
     AttemptRow("thin walls", FIRST_TWO_LAYOUTS, lambda scan, now: scan.has_thin_walls, {"thin_walls": True}),
+    AttemptRow(  # where the points of one side are sparse
+        "thin walls, samples as usual",
+        FIRST_TWO_LAYOUTS,
+        lambda scan, now: not now.box_size and (now.thin_walls or scan.has_thin_walls),
+        {"thin_walls": True, "box_size": SAMPLE_SPACING},
+    ),
     AttemptRow("front without rows", SECOND_LAYOUT),
     AttemptRow("rows turned", TURNED_ROWS, lambda scan, now: has_one_lattice(scan.cloud, now)),
     # where edges, limbs or slits are in the way, other fronts seldom help

@@ -212,7 +212,7 @@ class Advice:
         That is openings which this one closes, or ridges which it loses.
         """
         below = self.next_below(trial.length)
-        shorter = self.try_length(below, ladder.A_FEW) if trial.follows_less and below < trial.length else None
+        shorter = self.try_length(below, ladder.FIRST_TWO) if trial.follows_less and below < trial.length else None
         if shorter is None or not shorter.passed or shorter.lost > trial.lost + ladder.LOST_ALIKE:
             return trial.length
         return below if shorter.follows_less < trial.follows_less else trial.length

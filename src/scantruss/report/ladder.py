@@ -6,7 +6,7 @@ from __future__ import annotations
 FIRST_TWO, A_FEW, SOME_MORE = 2, 4, 8
 #: lengths to try in turn after the usual one, as multiples of it, with how many grids are made of each
 LONGER_FIRST = (
-    (1.4, A_FEW), (2.0, A_FEW), (2.8, A_FEW), (1 / 1.4, A_FEW), (2.0, SOME_MORE), (1.4, SOME_MORE), (1.0, SOME_MORE),
+    (1.4, A_FEW), (2.0, A_FEW), (1.0, SOME_MORE), (2.8, A_FEW), (1 / 1.4, A_FEW), (2.0, SOME_MORE), (1.4, SOME_MORE),
     (2.8, SOME_MORE), (0.5, A_FEW),
 )  # fmt: skip
 #: the same where the usual one passes, or leaves out much: members are too long for thin parts rather than too short
