@@ -81,14 +81,12 @@ class AttemptLimit:
         self._allowed = MOST_RUNS
         self._far: list[tuple[Settings, int]] = []  # settings, and how many attempts in a row were far from passing
         self._given_up = self._of_cells = 0
-        self._hopes: list[
-            bool
-        ] = []  # for each fault that was noted, whether it is neither far from passing nor the front's
+        # for each fault that was noted, whether it is neither far from passing nor the front's
+        self._hopes: list[bool] = []
         # settings with which more is cut off than may be missing
         self._losing_limbs: list[Settings] = [] if earlier is None else earlier._losing_limbs
-        self._failing_by_front: list[
-            tuple[Attempt, ScanTrussError]
-        ] = []  # attempts of one front that no search makes pass
+        # attempts of one front that no search makes pass
+        self._failing_by_front: list[tuple[Attempt, ScanTrussError]] = []
         self._known_to_fail = [] if earlier is None else earlier._failing_by_front
         self.runs, self._looks_one_sided = 0, False  #: grids that were made
 

@@ -29,9 +29,8 @@ from .sharp_edges import BESIDE_EDGE, beside_edges, coarse_samples, on_sharp_edg
 from .size_field import Wish, wish_of
 
 SPARSE_SPACING = 0.08  # point spacing above which larger samples are not tried [member lengths]
-WALL_SAMPLE_SPACING = (
-    0.1  # distance of the samples of thin walls: at their lips there is room for two or three [member lengths]
-)
+# distance of the samples of thin walls: at their lips there is room for two or three [member lengths]
+WALL_SAMPLE_SPACING = 0.1
 UNEVEN_BEND = 20.0  # largest angle between mirrored normals on a smooth scan; at a ridge it is twice as large [degree]
 # what a point of the scan was judged to be
 KEPT, DUPLICATE, OUTLIER, SPARSE_POINT, ROD, LIMB, SLIT = 0, 1, 2, 3, 4, 5, 6

@@ -37,9 +37,8 @@ SIDES_CANCEL = 0.7  # length of the mean normal below which the sides turn by mo
 FACES_OUT = 0.5  # least cosine of the angle between the normals of a crest and the direction in which it points
 HALF_OF_FOLD = 0.5  # the fold turns from so far on one side to so far on the other [member lengths]
 FEWEST_OF_SIDE, FEWEST_OF_CREST = 4, 4  # samples
-SIDES_TURN_BACK = math.radians(
-    125.0
-)  # turn from which on one sample of the crest is enough: the lip of a thin wall has room for no more
+# turn from which on one sample of the crest is enough: the lip of a thin wall has room for no more
+SIDES_TURN_BACK = math.radians(125.0)
 SEARCHES_OF_CREST = 4  # how often the line is moved to where both sides meet
 FARTHEST_SHIFT = 0.3  # at most so far each time [member lengths]
 SHARE_OF_DIAGONAL = 1e-9  # added to the normal equations of the crest, which a straight row of samples leaves open
