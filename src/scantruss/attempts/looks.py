@@ -31,6 +31,7 @@ SAID_BESIDE_RODS = ("aside", "far", "peak")  # kinds of warnings of a grid that 
 THIN_WALL, SOME_WALLS = 0.8, 0.05  # thickness of a thin wall [member lengths], and share of the places that have one
 ROUGH_AS_WALLS = 0.5  # share of its roughness that is left at most where the sides of walls are distinguished
 # kinds of warnings of a grid that jumps between walls
+MISSED_LAYER = ("unfollowed", "peak", "rounded", "offset", "far", "missed")
 NOISE_AS_WALLS = 0.025  # noise from which on it looks like walls: at walls it is 0.01 at most [member lengths]
 # share of the distance within which a twentieth of the points is not, down to which a grid follows a scan plainly better than another
 PLAINLY_NEARER = 0.75
@@ -278,6 +279,3 @@ def _variation(grid: Grid) -> float:
     """Return the standard deviation of the member lengths over their mean, or over the lengths desired there."""
     quality = grid.quality
     return quality.length_cv if quality.stretch_cv is None else quality.stretch_cv
-
-
-MISSED_LAYER = ("unfollowed", "peak", "rounded", "offset", "far", "missed")
