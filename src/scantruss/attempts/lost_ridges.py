@@ -9,7 +9,7 @@ import numpy as np
 from ..boundary.curves import length_along
 from ..check.distances import distances_to_grid
 from ..check.left_out import points_together
-from ..check.limits import NOISES_OFF
+from ..check.limits import COVER_REACH, NOISES_OFF
 from ..constraints.lines_of_folds import FOLD_STRIDE, GAIN_OF_SURE
 from ..constraints.network import runs
 from ..constraints.ridges import fold_lines
@@ -60,7 +60,7 @@ def lost_ridges(
     finer = max(FINER * length, FEWEST_SPACINGS_OF_FINER * cloud.spacing)
     if finer > COARSEST_FINER * length or not _may_cut_folds(grid, cloud, made, length):
         return []
-    settings = made.replace(length=finer, length_field="", ridge_angle=asked.ridge_angle)
+    settings = made.replace(length=finer, length_field="", ridge_angle=asked.ridge_angle, limb_girth=0.0)
     try:
         samples = sample_surface(cloud, settings)
         lines = [] if samples.smooth else fold_lines(samples, settings).narrow
@@ -96,7 +96,7 @@ def _is_cut(places: np.ndarray, grid: Grid, length: float, known: np.ndarray, wi
     away = distances_to_grid(np.ascontiguousarray(places), grid, length)[0]
     around = np.ones(min(window, len(places)))
     mean = np.convolve(away, around, "same") / np.convolve(np.ones(len(places)), around, "same")
-    cut: np.ndarray = mean > FOLD_OFF * length
+    cut: np.ndarray = (mean > FOLD_OFF * length) & (away < COVER_REACH * length)  # what is farther off is missed
     gaps = np.linalg.norm(places[:, None] - known, axis=2).min(axis=1, initial=np.inf)
     return cut & (gaps > SAME_FOLD * length)
 
