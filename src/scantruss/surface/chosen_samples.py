@@ -29,8 +29,9 @@ from .sharp_edges import BESIDE_EDGE, beside_edges, coarse_samples, on_sharp_edg
 from .size_field import Wish, wish_of
 
 SPARSE_SPACING = 0.08  # point spacing above which larger samples are not tried [member lengths]
-# distance of the samples of thin walls: at their lips there is room for two or three [member lengths]
-WALL_SAMPLE_SPACING = 0.1
+# distance of the samples of thin walls: at their lips there is room for two or three [member lengths]; and at least, as the points
+# inside a wall lie farther apart than those outside [spacings of the points]
+WALL_SAMPLE_SPACING, SPACINGS_INSIDE = 0.1, 1.8
 UNEVEN_BEND = 20.0  # largest angle between mirrored normals on a smooth scan; at a ridge it is twice as large [degree]
 # what a point of the scan was judged to be
 KEPT, DUPLICATE, OUTLIER, SPARSE_POINT, ROD, LIMB, SLIT = 0, 1, 2, 3, 4, 5, 6
@@ -167,5 +168,7 @@ def radius_of_samples(asked: Asked, spacing: float) -> float:
 
     So they are never narrower than the spacing of the points, the lower bound of Eq. 1; holes need no upper one (docs/choices.md).
     """
-    usual = WALL_SAMPLE_SPACING if asked.thin_walls else SAMPLE_SPACING
-    return max((asked.box_size or usual) * asked.length, spacing / LINK_BOX)
+    usual = SAMPLE_SPACING * asked.length
+    if asked.thin_walls:
+        usual = min(max(WALL_SAMPLE_SPACING * asked.length, SPACINGS_INSIDE * spacing), usual)
+    return max(asked.box_size * asked.length if asked.box_size else usual, spacing / LINK_BOX)
