@@ -18,7 +18,7 @@ from scantruss.kernels.geometry.boxes import new_boxes
 from scantruss.kernels.surface.samples import put_all
 from scantruss.kernels.surface.sides import vote_on_sides
 from scantruss.settings import SAMPLE_SPACING
-from scantruss.surface.chosen_samples import radius_of_samples
+from scantruss.surface.chosen_samples import Asked, radius_of_samples
 from scantruss.surface.samples import sample_surface
 
 RADIUS, WALL, HEIGHT, DEPTH = (
@@ -77,10 +77,10 @@ def test_thin_walls_are_tried_where_there_are_some() -> None:
 
 
 def test_samples_of_thin_walls_are_close_but_not_as_close_as_the_points() -> None:
-    settings = st.Settings(length=1.0, thin_walls=True)
+    settings = Asked.of(st.Settings(length=1.0, thin_walls=True), np.zeros(3), False)
     apart = [radius_of_samples(settings, spacing) for spacing in (0.01, 0.08, 0.15)]
     assert apart == pytest.approx([0.1, 0.144, 0.2])
-    assert radius_of_samples(settings.replace(thin_walls=False), 0.01) == pytest.approx(0.2)
+    assert radius_of_samples(settings._replace(thin_walls=False), 0.01) == pytest.approx(0.2)
 
 
 def test_the_lip_of_a_wall_of_a_third_of_a_member_is_one_line_along_its_middle() -> None:
