@@ -23,10 +23,8 @@ WITHOUT_RODS = "passes, but along rods: without them"
 BETWEEN_WALLS = "passes, but jumps between thin walls: with their sides distinguished"
 BREAKS_LIMB = "the grid is torn at a limb thinner than its members"
 RIDGES_GIVEN_UP = "ridges given up near the faults"
-TRIED_BEFORE_WALLS = (
-    AS_ASKED,
-    RIDGES_GIVEN_UP,
-)  # rows of grids that pass before the sides of walls were ever distinguished
+# rows of grids that pass before the sides of walls were ever distinguished
+TRIED_BEFORE_WALLS = (AS_ASKED, RIDGES_GIVEN_UP)
 
 
 class AttemptCourse:
