@@ -344,6 +344,25 @@ def test_fronts_that_would_all_miss_the_same_limbs_are_not_tried() -> None:
             assert limit.allows(other) == (tried or not alike)
 
 
+def test_looks_at_thin_walls_by_two_distances_of_the_samples_are_given_up_as_one() -> None:
+    attempt = next(attempts(st.PointCloud.from_array(sheet(8.0, 8.0, 0.25)), st.Settings(length=1.0)))
+    found = SimpleNamespace(
+        missing=0.5, faults=(), left_out=(), crossings=0, boundary_loops=1, scan_loops=1, pieces=1, scan_pieces=1
+    )
+    far = st.CertificateError("the grid leaves out 50 %", cast(Any, SimpleNamespace(certificate=found)))
+    for changes, hopeful in (
+        ([{}, {"thin_walls": True}, {"thin_walls": True, "box_size": 0.35}], True),
+        ([{}, {"thin_walls": True}, {"sharp_edges": True}], False),
+        ([{}, {"box_size": 0.35}, {"box_size": 0.4}], False),
+    ):
+        limit = AttemptLimit()
+        for change in changes:
+            other = replace(attempt, settings=attempt.settings.replace(**cast(Any, change)))
+            for _ in range(2):
+                limit.note(other, far)
+        assert limit.any_left() == hopeful
+
+
 @compiled_only
 @pytest.mark.parametrize("apart", [0.36, 0.4])
 def test_two_layers_too_near_for_the_members_are_refused_after_two_grids(

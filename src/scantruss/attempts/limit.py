@@ -80,7 +80,8 @@ class AttemptLimit:
     def __init__(self, earlier: AttemptLimit | None = None) -> None:
         self._allowed = MOST_RUNS
         self._far: list[tuple[Settings, int]] = []  # settings, and how many attempts in a row were far from passing
-        self._given_up = self._of_cells = 0
+        self._given_up: set[Settings] = set()
+        self._of_cells = 0
         # for each fault that was noted, whether it is neither far from passing nor the front's
         self._hopes: list[bool] = []
         # settings with which more is cut off than may be missing
@@ -88,7 +89,8 @@ class AttemptLimit:
         # attempts of one front that no search makes pass
         self._failing_by_front: list[tuple[Attempt, ScanTrussError]] = []
         self._known_to_fail = [] if earlier is None else earlier._failing_by_front
-        self.runs, self._looks_one_sided = 0, False  #: grids that were made
+        self.runs = 0  #: grids that were made
+        self._looks_one_sided = self._joins_sheets = False
 
     def allow(self, more: int) -> None:
         """Pause after some more grids."""
@@ -104,7 +106,7 @@ class AttemptLimit:
 
     def _is_hopeful(self) -> bool:
         """Whether any attempt is worth making."""
-        return self._given_up < MOST_GIVEN_UP and self._of_cells < MOST_RUNS_OF_CELLS
+        return not self._joins_sheets and len(self._given_up) < MOST_GIVEN_UP and self._of_cells < MOST_RUNS_OF_CELLS
 
     @property
     def all_hopeless(self) -> bool:
@@ -156,9 +158,12 @@ class AttemptLimit:
         self._hopes.append(not is_far and not fails_by_front(fault))
         far = self._far_in_a_row(attempt.settings) + 1 if is_far else 0
         self._far = [pair for pair in self._far if pair[0] != attempt.settings] + [(attempt.settings, far)]
-        self._given_up += far == MOST_FAR and not attempt.settings.smooth_scale  # of those there are four
-        if far == MOST_FAR and joins_sheets(fault):
-            self._given_up = MOST_GIVEN_UP
+        if far < MOST_FAR:
+            return
+        if joins_sheets(fault):
+            self._joins_sheets = True
+        elif not attempt.settings.smooth_scale:  # of those there are four
+            self._given_up.add(_as_given_up(attempt.settings))
 
 
 def _is_far_from_passing(attempt: Attempt, fault: ScanTrussError) -> bool:
@@ -171,6 +176,11 @@ def _is_far_from_passing(attempt: Attempt, fault: ScanTrussError) -> bool:
     if found.missing > FAR_MISSING * attempt.settings.allow_missing or loses_limbs(attempt.settings, fault, 1.0):
         return True
     return found.crossings + abs(found.boundary_loops - found.scan_loops) > FAR_FROM_PASSING
+
+
+def _as_given_up(settings: Settings) -> Settings:
+    """Return the settings that count as one where they are given up: for thin walls, with whatever distance of the samples."""
+    return settings.replace(box_size=None) if settings.thin_walls else settings
 
 
 def _cuts_alike(settings: Settings, other: Settings) -> bool:
