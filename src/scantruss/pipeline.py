@@ -14,7 +14,7 @@ import numpy as np
 from .attempts.course import AttemptCourse
 from .attempts.limit import AttemptLimit
 from .attempts.looks import follows_better, follows_ridges_as_well
-from .attempts.table import Attempt
+from .attempts.table import AS_ASKED, Attempt
 from .boundary.find import find_boundary
 from .candidates import advance_fronts, best_that_passes, improve_fronts
 from .cells.make import settings_of_triangles, with_cells
@@ -182,13 +182,25 @@ def make_grid_with_wide_ridges(cloud: PointCloud, attempt: Attempt, *, progress:
     every = tuple(sorted({*made, *crests_cut_off(plain, crests, settings.length)}))
     tried = {every: follows_better, made: follows_ridges_as_well}  # the second alone where both are the same
     for wide, is_taken in tried.items():
-        if not wide:
-            continue
-        with suppress(FrontError):
-            folded = make_grid(cloud, replace(first, wide=wide), progress=seen)
-            if is_taken(folded, plain):
-                return make_grid(cloud, replace(attempt, wide=wide), progress=progress) if is_long else folded
+        folded, wide_taken = _with_wide_ridges(cloud, replace(first, wide=wide), seen) if wide else (None, ())
+        if folded is not None and is_taken(folded, plain):
+            with suppress(FrontError):
+                return make_grid(cloud, replace(attempt, wide=wide_taken), progress=progress) if is_long else folded
     return make_grid(cloud, attempt, progress=progress) if is_long else plain
+
+
+def _with_wide_ridges(
+    cloud: PointCloud, attempt: Attempt, progress: Progress | None
+) -> tuple[Grid | None, tuple[int, ...]]:
+    """Return the grid with ridges along wide folds, and which; where it fails beside some, without those; None where that fails too."""
+    try:
+        return make_grid(cloud, attempt, progress=progress), attempt.wide
+    except FrontError as fault:
+        later = attempt.without_wide(fault, cloud)
+    if later is not None:
+        with suppress(FrontError):
+            return make_grid(cloud, later, progress=progress), later.wide
+    return None, ()
 
 
 def _unseen(progress: Progress | None) -> Progress | None:
@@ -222,8 +234,10 @@ def first_that_passes(
         None passes; see `AttemptCourse.outcome`.
     """
     course = AttemptCourse(cloud, settings, tried, limit)
+    first_looks = (settings, settings.replace(thin_walls=True))
     for attempt in course:
-        make = make_grid_with_wide_ridges if attempt == Attempt(settings) else make_grid
+        as_first = attempt.settings in first_looks and replace(attempt, settings=settings, row=AS_ASKED) == Attempt(settings)
+        make = make_grid_with_wide_ridges if as_first else make_grid
         try:
             course.passed(attempt, make(cloud, attempt, progress=progress))
         except ScanTrussError as error:

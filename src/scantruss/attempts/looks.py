@@ -74,10 +74,10 @@ class AskedScan:
     @cached_property
     def has_thin_walls(self) -> bool:
         """Whether the scan has both sides of a wall thinner than a member, which its samples do not tell apart."""
-        if not self.by_default or self.asked.thin_walls or self.cloud.normals is not None or self.rough < ROUGH_SCAN:
+        if not self.by_default or self.asked.thin_walls or self.cloud.normals is not None:
             return False
         samples = sample_surface(self.cloud, self.asked.replace(thin_walls=True))
-        if samples.rough > ROUGH_AS_WALLS * self.rough:  # it is no wall but noise that makes it look rough
+        if self.rough >= ROUGH_SCAN and samples.rough > ROUGH_AS_WALLS * self.rough:  # it is noise that makes it look rough
             return False
         return wall_of_surface(samples, THIN_WALL * self.asked.length)[1] > SOME_WALLS
 

@@ -7,10 +7,13 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from ..boundary.find import find_boundary
 from ..cells.make import settings_of_triangles
 from ..check.refusal import MOST_ACCEPTED
-from ..constraints.find import ridges_away_from, ridges_given_up
+from ..constraints.find import ridges_away_from, ridges_given_up, wide_folds
+from ..constraints.ridges import FAULT_REACH
 from ..errors import CertificateError, words_of_place
 from ..front.orientation_field import FieldStart
 from ..settings import SAMPLE_SPACING
@@ -19,12 +22,11 @@ from .limit import FAR_MISSING, only_leaves_out
 from .looks import ROUGH_SCAN, VERY_ROUGH_SCAN, AskedScan, has_one_lattice
 
 if TYPE_CHECKING:
-    import numpy as np
-
     from ..errors import FrontError, ScanTrussError
     from ..grid.certificate import Certificate
     from ..scan.cloud import PointCloud
     from ..settings import Settings
+    from ..surface.samples import SurfaceSamples
 
 AS_ASKED = "as asked"
 # lengths of the fronts without rows, in desired lengths, tried in turn where no other passes
@@ -63,28 +65,34 @@ class Attempt:
         follows = self.settings.ridge_angle > 0.0 and self.settings.method == "default" and self.starts is None
         if not follows or len(self.faults) >= FAULTS_WITHOUT_RIDGES or not (followed := self.ridge_points(cloud)):
             return None
-        if isinstance(fault, CertificateError):
-            fault = fault.whole
-        found = fault.grid.certificate if fault.grid is not None else None
-        places = [each.where for each in found.faults if each.where] if found is not None else []
-        places += [fault.where] if fault.where else []
-        new = tuple(dict.fromkeys(place for place in places if place not in self.faults))
+        new = tuple(dict.fromkeys(place for place in _places_of(fault) if place not in self.faults))
         later = replace(self, faults=self.faults + new)
         return later if new and later.ridge_points(cloud) < followed else None
 
+    def without_wide(self, fault: FrontError, cloud: PointCloud) -> Attempt | None:
+        """The same attempt without the wide folds beside which it failed; None where that is none, or all."""
+        samples, settings = self._samples(cloud)
+        folds, places = wide_folds(samples, settings), np.reshape(_places_of(fault), (-1, 1, 3)) - samples.origin
+        near = [bool((((places - fold) ** 2).sum(axis=2) < (FAULT_REACH * settings.length) ** 2).any()) for fold in folds]
+        kept = tuple(number for number in self.wide if not near[number])
+        return replace(self, wide=kept) if kept and kept != self.wide else None
+
     def ridge_points(self, cloud: PointCloud) -> int:
         """Return by how many points the ridges go that this attempt follows."""
-        settings = settings_of_triangles(self.settings)
-        samples, _ = find_boundary(sample_surface(cloud, settings), settings)
+        samples, settings = self._samples(cloud)
         return sum(len(ridge.places) for ridge in ridges_away_from(self.faults, samples, settings, self.wide))
 
     def ridges_given_up(self, cloud: PointCloud) -> list[np.ndarray]:
         """Return the parts of ridges that this attempt does not follow, the longest first, each (K, 3) [scan unit]."""
         if not self.faults:
             return []
-        settings = settings_of_triangles(self.settings)
-        samples, _ = find_boundary(sample_surface(cloud, settings), settings)
+        samples, settings = self._samples(cloud)
         return ridges_given_up(self.faults, samples, settings, self.wide)
+
+    def _samples(self, cloud: PointCloud) -> tuple[SurfaceSamples, Settings]:
+        """Return the surface samples that this attempt takes of a scan, and the settings of its triangles."""
+        settings = settings_of_triangles(self.settings)
+        return find_boundary(sample_surface(cloud, settings), settings)[0], settings
 
     def has_one_front(self, cloud: PointCloud) -> bool:
         """Whether it has one front, the same with any effort."""
@@ -102,6 +110,14 @@ class Attempt:
         if self.settings.plain_body and found.missing <= FAR_MISSING * self.settings.allow_missing:
             return f"with --plain-body {allowing} a grid without its thin limbs passes, {_dropping(found)}"
         return ""
+
+
+def _places_of(fault: FrontError) -> list[tuple[float, float, float]]:
+    """Return the places at which a grid fails [scan unit]."""
+    whole = fault.whole if isinstance(fault, CertificateError) else fault
+    found = whole.grid.certificate if whole.grid is not None else None
+    places = [each.where for each in found.faults if each.where] if found is not None else []
+    return places + ([whole.where] if whole.where else [])
 
 
 def _dropping(found: Certificate) -> str:
