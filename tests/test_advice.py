@@ -18,8 +18,9 @@ from typed import known
 
 import scantruss as st
 from scantruss import pipeline
-from scantruss.attempts.limit import AttemptLimit
+from scantruss.attempts.limit import FAR_FROM_PASSING, AttemptLimit
 from scantruss.attempts.table import Attempt
+from scantruss.check.crossings import MOST_CROSSINGS
 from scantruss.cli.main import main
 from scantruss.errors import FrontError
 from scantruss.grid.certificate import Certificate, Fault, LeftOut
@@ -325,8 +326,51 @@ def test_of_lengths_that_lose_about_as_much_the_usual_one_is_suggested(monkeypat
     monkeypatch.setattr(advice, "next_above", lambda length: 1.3 * length)
     least = 0.0325
     assert advice.suggest() == advice._usual
+    least = 0.029  # nearly all of which is lost at any of them
+    assert advice.suggest() == advice._usual
     least = 0.02
     assert advice.suggest() < advice._usual
+
+
+def refused_with(crossings: int) -> st.CertificateError:
+    """Return the refusal of a grid with so many triangles that cut each other, and two boundaries of three."""
+    found = Certificate(
+        "", 0.5, True, True, 1, 1, 2, 3, 1, 0, crossings=crossings, faults=(Fault("crossing", "cuts itself"),)
+    )
+    return st.CertificateError("it fails", cast(Any, SimpleNamespace(certificate=found, cells="triangle")))
+
+
+def failing_with(monkeypatch: pytest.MonkeyPatch, crossings: int) -> tuple[float, list[float]]:
+    """Return the usual length of a cloud and the lengths of all grids that are made for a suggestion, none of which passes."""
+    made: list[float] = []
+
+    def fails(cloud: st.PointCloud, attempt: Attempt, **others: Any) -> st.Grid:
+        made.append(attempt.settings.length)
+        raise refused_with(crossings)
+
+    monkeypatch.setattr(pipeline, "make_grid", fails)
+    advice = Advice(cloud_of("limpet"), st.Settings(length=1.0))
+    assert advice.suggest() == advice._usual and not advice.passes
+    return advice._usual, made
+
+
+def test_where_grids_cut_themselves_everywhere_few_lengths_get_a_single_grid_each(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    usual, made = failing_with(monkeypatch, MOST_CROSSINGS)
+    grids = [made.count(length) for length in dict.fromkeys(made)]
+    assert len(made) <= 10 and grids[0] <= 4 and set(grids[1:]) == {1}
+    assert max(made) > 2.0 * usual  # at which sheets may be one
+
+
+def test_where_grids_are_far_from_passing_other_lengths_get_two_grids(monkeypatch: pytest.MonkeyPatch) -> None:
+    usual, made = failing_with(monkeypatch, FAR_FROM_PASSING)
+    assert all(made.count(length) <= 2 for length in set(made) - {usual}) and len(made) <= 14
+
+
+def test_where_grids_nearly_pass_all_lengths_are_tried(monkeypatch: pytest.MonkeyPatch) -> None:
+    usual, made = failing_with(monkeypatch, 1)
+    assert len(made) > 14 and min(made) < usual and any(made.count(length) > 2 for length in set(made) - {usual})
 
 
 @pytest.mark.parametrize("kind", ["hole", "gap"])

@@ -378,3 +378,13 @@ def test_points_are_sorted_where_their_samples_are_many(monkeypatch: pytest.Monk
     assert module.thin_dense(points, bounds, 0.2, 0.05) is points
     few = points[:900]
     assert module.thin_dense(few, bounds_of(few), 0.2, 0.3) is few
+
+
+def test_samples_without_rods_are_those_with_them_where_a_scan_has_none() -> None:
+    plate, wanted = sheet(10.0, 8.0, 0.15, noise=0.06), Settings(length=1.2)
+    cloud = PointCloud.from_array(plate)
+    usual = sample_surface(cloud, wanted)
+    assert not usual.smooth and sample_surface(cloud, wanted.replace(keep_rods=False)) is usual
+    alone = sample_surface(PointCloud.from_array(plate), wanted.replace(keep_rods=False))  # found by themselves
+    assert np.array_equal(alone.surface.mean, usual.surface.mean) and np.array_equal(alone.judged, usual.judged)
+    assert np.array_equal(alone.surface.normals, usual.surface.normals) and alone.pieces == usual.pieces

@@ -200,7 +200,9 @@ class AttemptCourse:
         """Return why no grid passes with the effort that was tried last."""
         if not self._faults:
             return FrontError("none of the attempts made gives a grid that passes")
-        worst = next((fault.whole for fault in self._faults if isinstance(fault, CertificateError)), self._faults[0])
+        worst = next((fault for fault in self._faults if isinstance(fault, CertificateError)), self._faults[0])
+        if isinstance(worst, CertificateError) and not (self._row_begun is not None and self._row_begun.is_trial):
+            worst = worst.whole
         if self._advice and isinstance(worst, FrontError) and not only_leaves_out(worst):
             return type(worst)(f"{worst}; {self._advice}", worst.grid, worst.where)
         return worst

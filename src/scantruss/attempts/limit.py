@@ -44,13 +44,19 @@ def fails_by_front(fault: ScanTrussError) -> bool:
     return isinstance(fault, CertificateError) and bool(_kinds_of(fault) & FAULTS_OF_FRONTS)
 
 
+def cuts_everywhere(fault: ScanTrussError | None) -> bool:
+    """Whether so many triangles of a grid cut each other that they were not all counted."""
+    found = fault.grid.certificate if isinstance(fault, CertificateError) else None
+    return found is not None and found.crossings >= MOST_CROSSINGS
+
+
 def joins_sheets(fault: ScanTrussError | None) -> bool:
     """Whether a grid cuts itself everywhere since it joins sheets of the scan that lie too near each other: no other look parts them.
 
     It has fewer pieces than the scan, or falls into more where the sheets are one piece of the scan, and is no manifold.
     """
     found = fault.grid.certificate if isinstance(fault, CertificateError) else None
-    if found is None or found.crossings < MOST_CROSSINGS:
+    if found is None or not cuts_everywhere(fault):
         return False
     return found.pieces < found.scan_pieces or (found.pieces > found.scan_pieces and not found.manifold)
 
@@ -78,12 +84,13 @@ class AttemptLimit:
     """
 
     def __init__(self, earlier: AttemptLimit | None = None) -> None:
-        self._allowed = MOST_RUNS
+        self._allowed, self._stops_early = MOST_RUNS, False
         self._far: list[tuple[Settings, int]] = []  # settings, and how many attempts in a row were far from passing
         self._given_up: set[Settings] = set()
         self._of_cells = 0
         # for each fault that was noted, whether it is neither far from passing nor the front's
         self._hopes: list[bool] = []
+        self._all_far = self._all_cut = True  # whether all grids are far from passing, and cut themselves everywhere
         # settings with which more is cut off than may be missing
         self._losing_limbs: list[Settings] = [] if earlier is None else earlier._losing_limbs
         # attempts of one front that no search makes pass
@@ -92,17 +99,25 @@ class AttemptLimit:
         self.runs = 0  #: grids that were made
         self._looks_one_sided = self._joins_sheets = False
 
-    def allow(self, more: int) -> None:
-        """Pause after some more grids."""
-        self._allowed = min(MOST_RUNS, self.runs + more)
+    def allow(self, more: int, stops_early: bool = False) -> None:
+        """Pause after some more grids.
+
+        stops_early : pause too after a first grid that cuts itself everywhere, or two far from passing, where no other is nearer
+        """
+        self._allowed, self._stops_early = min(MOST_RUNS, self.runs + more), stops_early
 
     def any_left(self) -> bool:
         """Whether any attempt is worth making, and allowed."""
-        return self._is_hopeful() and self.runs < self._allowed
+        return self._is_hopeful() and not self._is_stopped()
 
     def is_paused(self) -> bool:
         """Whether attempts would be worth making that are not allowed."""
-        return self._is_hopeful() and self._allowed <= self.runs < MOST_RUNS
+        return self._is_hopeful() and self._is_stopped() and self.runs < MOST_RUNS
+
+    def _is_stopped(self) -> bool:
+        """Whether no more grids are allowed."""
+        is_far = self._all_cut or (self._all_far and len(self._hopes) >= MOST_FAR)
+        return self.runs >= self._allowed or (self._stops_early and bool(self._hopes) and is_far)
 
     def _is_hopeful(self) -> bool:
         """Whether any attempt is worth making."""
@@ -156,6 +171,8 @@ class AttemptLimit:
             self._losing_limbs.append(attempt.settings)
         is_far = _is_far_from_passing(attempt, fault)
         self._hopes.append(not is_far and not fails_by_front(fault))
+        self._all_far &= is_far
+        self._all_cut &= cuts_everywhere(fault)
         far = self._far_in_a_row(attempt.settings) + 1 if is_far else 0
         self._far = [pair for pair in self._far if pair[0] != attempt.settings] + [(attempt.settings, far)]
         if far < MOST_FAR:

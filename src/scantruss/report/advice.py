@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..attempts.limit import AttemptLimit, loses_limbs
+from ..attempts.limit import AttemptLimit, cuts_everywhere, loses_limbs
 from ..attempts.table import attempts
 from ..errors import FrontError, InputError, LengthError, LinesError, OneSidedError, ScanTrussError
 from ..pipeline import first_that_passes
@@ -117,7 +117,7 @@ class Advice:
             self._begun[length] = (settings, trials, AttemptLimit())
         settings, tried, limit = self._begun[length]
         before = limit.runs
-        limit.allow(allowed)
+        limit.allow(allowed, stops_early=not (self._is_nearby or length == self._usual or self.passes))
         grid, fault = None, known.fault if known is not None else None
         try:
             grid = first_that_passes(self._cloud, settings, tried, limit=limit, progress=self._show(length))
@@ -179,6 +179,8 @@ class Advice:
             length = self._as_tried(min(max(_two_digits(share * self._usual), low), high))
             if most > ladder.A_FEW and self._loses_limbs() and self.passes:
                 break  # a shorter length than the usual one keeps them, which more grids seldom do
+            if self._is_hopeless():
+                break
             if any(trial.loses_limbs and trial.length < length for trial in self.tried):
                 continue
             trial = self.try_length(length, most)
@@ -191,7 +193,8 @@ class Advice:
                     return self._following_more(trial)
         if both:
             least = min(both.values())
-            return next(length for length, lost in both.items() if lost <= least + ladder.LOST_ALIKE)
+            most_lost = max(least + ladder.LOST_ALIKE, ladder.LOST_ALIKE_SHARE * least)
+            return next(length for length, lost in both.items() if lost <= most_lost)
         if not self.passes:
             self._try_longer()
         if not self.passes:
@@ -205,6 +208,12 @@ class Advice:
                 return below
         followed = [one for one in passing if any(one < other <= ladder.NEARLY_NEXT * one for other in passing)]
         return min(followed or passing, key=self._far_from_usual, default=self._usual)
+
+    def _is_hopeless(self) -> bool:
+        """Whether some lengths were tried, and the grids of all of them are far from passing or fail by their fronts."""
+        keeps_limbs = self._too_long == math.inf  # else shorter members may
+        enough = keeps_limbs and len(self._begun) >= ladder.HOPELESS_LENGTHS
+        return enough and all(limit.all_hopeless for _, _, limit in self._begun.values())
 
     def _following_more(self, trial: LengthTrial) -> float:
         """Return the length of a trial that passes, or the next below it if that follows what this one does not, and loses no more.
@@ -233,9 +242,11 @@ class Advice:
                 return
 
     def _try_beside(self) -> None:
-        """Try lengths beside the usual one until one passes, of a scan that leaves grids for it: steps as of the table may miss it."""
+        """Try lengths beside the usual one until one passes, where grids and hope are left: steps as of the table may miss it."""
         left = ladder.MOST_TRIED + ladder.TRIED_AROUND - self._spent
-        if left < ladder.FIRST_TWO or ladder.LEAST_TRIED * self._cost(self._usual) >= ladder.POINTS_LOOKED_AT:
+        is_large = ladder.LEAST_TRIED * self._cost(self._usual) >= ladder.POINTS_LOOKED_AT
+        usual = self._begun.get(self._usual)
+        if is_large or left < ladder.FIRST_TWO or (usual is not None and usual[2].all_hopeless):
             return
         self._count_at(self._usual, min(left, ladder.FIRST_TWO * len(ladder.BESIDE_USUAL)))
         for share in ladder.BESIDE_USUAL:
@@ -251,12 +262,12 @@ class Advice:
         yield 1.0, ladder.A_FEW
         if (wall := self._length_of_wall()) is not None:
             yield wall / self._usual, ladder.A_FEW
-            yield ladder.NEXT_LENGTH * wall / self._usual, ladder.FIRST_TWO
-            yield wall / self._usual, ladder.SOME_MORE
+            if not cuts_everywhere(getattr(self._found.get(self._as_tried(wall)), "fault", None)):
+                yield ladder.NEXT_LENGTH * wall / self._usual, ladder.FIRST_TWO
         usual = self._tried_usual()
-        steps = (
-            ladder.SHORTER_FIRST if usual is not None and (usual.passed or usual.leaves_out) else ladder.LONGER_FIRST
-        )
+        leaves_out = usual is not None and (usual.passed or usual.leaves_out)
+        first, *others = ladder.SHORTER_FIRST if leaves_out else ladder.LONGER_FIRST
+        steps = [first, *([] if wall is None else [(wall / self._usual, ladder.SOME_MORE)]), *others]
         yield from sorted(steps, key=lambda step: step[1]) if self._loses_limbs() else steps
 
     def _length_of_wall(self) -> float | None:

@@ -26,14 +26,14 @@ SURE_PER_SPACING = 8.0
 LENGTH_OF_WALL = 0.8  # of the thickness of a wall: at 1.4 times that, too, both of its sides are kept apart
 MOSTLY_WALL = 0.4  # share of a scan on a thin wall from which on lengths are chosen for that
 LEAST_OF_WALL = 5.0  # least length for a wall, in spacings
-LOST_ALIKE = 0.002  # share of the scan up to which lengths lose as much as one another
+# share of the scan up to which lengths lose as much as one another, and how many times as much where all lose more
+LOST_ALIKE, LOST_ALIKE_SHARE = 0.002, 1.2
 MOST_LOST = 0.01  # share of the scan that may be lost at a length that is suggested
 MOST_TRIED = 20.0  # grids that are made for a suggestion, or to find a length nearby, each counted by its cost
 POINTS_LOOKED_AT = 2_000_000  # points that are looked at for that
 LEAST_TRIED = 5.0  # grids that are made for that even where the scan has more points
 TRIED_AROUND = 6.0  # grids that are made besides for the lengths of the table, one each
 TRIED_LONGER = 2  # grids that are made of each longer length where no other has passed, of those for the table
-# lengths that are tried then where none of these passes, as multiples of the usual one
 TRIED_USUAL = 4.0  # grids that are made at the usual length where no length nearby passes and it is far away
 FAR_TOO_SHORT = 0.2  # share of the shortest possible length below which the usual one is looked at alone: that length is in another unit
 POINTS_PER_MEMBER = 9  # points that cost as much as a member of the grid
@@ -41,4 +41,8 @@ MOST_MEMBERS = 60_000  # members of a grid that is made to try a length
 CLOSE_BEND = 0.95  # share of the scan that is less bent than the radius that is named
 # lengths one after the other, all of whose grids are far from passing or fail by their fronts, after which no other nearby is tried
 HOPELESS_NEARBY = 4
+HOPELESS_LENGTHS = (
+    3  # lengths that were tried from which on only longer ones are looked at where there is no hope for any
+)
+# lengths that are tried beside the usual one where none of these passes, as multiples of it
 BESIDE_USUAL = (1.12, 0.9, 1.25)

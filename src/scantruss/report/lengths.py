@@ -20,7 +20,8 @@ def advice_rows(advice: Advice, length: float, cloud: PointCloud) -> tuple[tuple
     """Return head and rows of a table: what comes of a member length, of those around it and of others that were tried."""
     radius, unit = advice.radius, f" [{cloud.unit}]" if cloud.unit else ""
     rows: list[tuple[str, ...]] = []
-    advice.try_length(length)
+    if not advice.is_spent:
+        advice.try_length(length)
     trials: dict[float, LengthTrial | None] = dict.fromkeys(advice.around(length))
     advice.settle()
     trials |= {trial.length: trial for trial in advice.tried}

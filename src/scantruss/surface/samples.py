@@ -184,6 +184,10 @@ def sample_surface(cloud: PointCloud, settings: Settings) -> SurfaceSamples:
         most = max(1, POINTS_OF_KEPT_SAMPLES // max(len(cloud.points), 1))
         for oldest in list(kept)[: max(0, len(kept) + 1 - most)]:
             del kept[oldest]
+        with_rods = kept.get(asked._replace(keep_rods=True))
+        if not asked.keep_rods and with_rods is not None and _has_no_rods(with_rods, cloud.spacing, asked):
+            kept[asked] = with_rods
+            return with_rods
         lone = lone_of_cloud(cloud, asked.outlier_distance or UNCLEANED_DISTANCE)
         given = given_normals(cloud)
         if given is None and asked.thin_walls:
@@ -201,6 +205,14 @@ def sample_surface(cloud: PointCloud, settings: Settings) -> SurfaceSamples:
             lone=lone,
         )
     return kept[asked]
+
+
+def _has_no_rods(samples: SurfaceSamples, spacing: float, asked: Asked) -> bool:
+    """Whether samples are the same without the rods of their scan, as it has none: those of a smooth scan are others without them."""
+    if samples.smooth:
+        return False
+    left = np.ascontiguousarray(samples.scan[np.isin(samples.judged, (KEPT, LIMB, SLIT))])
+    return not points_of_rods(left, spacing, asked).any()
 
 
 def is_graded(surface: Surface) -> bool:
