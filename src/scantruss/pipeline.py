@@ -236,7 +236,9 @@ def first_that_passes(
     course = AttemptCourse(cloud, settings, tried, limit)
     first_looks = (settings, settings.replace(thin_walls=True))
     for attempt in course:
-        as_first = attempt.settings in first_looks and replace(attempt, settings=settings, row=AS_ASKED) == Attempt(settings)
+        as_first = attempt.settings in first_looks and replace(attempt, settings=settings, row=AS_ASKED) == Attempt(
+            settings
+        )
         make = make_grid_with_wide_ridges if as_first else make_grid
         try:
             course.passed(attempt, make(cloud, attempt, progress=progress))

@@ -77,7 +77,9 @@ class AskedScan:
         if not self.by_default or self.asked.thin_walls or self.cloud.normals is not None:
             return False
         samples = sample_surface(self.cloud, self.asked.replace(thin_walls=True))
-        if self.rough >= ROUGH_SCAN and samples.rough > ROUGH_AS_WALLS * self.rough:  # it is noise that makes it look rough
+        if (
+            self.rough >= ROUGH_SCAN and samples.rough > ROUGH_AS_WALLS * self.rough
+        ):  # it is noise that makes it look rough
             return False
         return wall_of_surface(samples, THIN_WALL * self.asked.length)[1] > SOME_WALLS
 

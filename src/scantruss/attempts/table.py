@@ -73,7 +73,9 @@ class Attempt:
         """The same attempt without the wide folds beside which it failed; None where that is none, or all."""
         samples, settings = self._samples(cloud)
         folds, places = wide_folds(samples, settings), np.reshape(_places_of(fault), (-1, 1, 3)) - samples.origin
-        near = [bool((((places - fold) ** 2).sum(axis=2) < (FAULT_REACH * settings.length) ** 2).any()) for fold in folds]
+        near = [
+            bool((((places - fold) ** 2).sum(axis=2) < (FAULT_REACH * settings.length) ** 2).any()) for fold in folds
+        ]
         kept = tuple(number for number in self.wide if not near[number])
         return replace(self, wide=kept) if kept and kept != self.wide else None
 

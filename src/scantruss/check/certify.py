@@ -16,7 +16,7 @@ from ..surface.chosen_samples import KEPT, OUTLIER
 from .bare import mostly_bare
 from .boundaries import places_aside, stops_short
 from .crossings import find_crossings
-from .crushed import crushed_parts, spikes
+from .crushed import crushed_parts, frayed, spikes
 from .defects import faults_in_space, faults_of_topology, fixed_off_scan
 from .distances import Distances, measure_distances, offsets_from_points
 from .doubtful import doubtful_places
@@ -26,7 +26,7 @@ from .handles import false_struts
 from .hanging import hanging_nodes, nodes_off_sheets
 from .irregular import count_irregular
 from .left_out import asked_for, closed_holes, first_and_more, parts_left_out, without_caps
-from .limits import COVER_REACH, limits_of, mostly_rounded, places_to_look_at, widened_limits
+from .limits import COVER_REACH, MOST_OF_RODS, limits_of, mostly_rounded, places_to_look_at, widened_limits
 from .missed import farthest_followed, largest_patch_missed, points_missed, shares_rounded
 from .openings import boundary_faults
 from .refusal import passed_grid
@@ -119,6 +119,8 @@ class Judged:
         bridged = [each for each in bridged if each.kind == "bridged" or not each.is_said_by(parts)]
         holes = [*closed, *first_and_more([*(gap for gap in gaps if gap not in parts), *slits])]
         lids = openings_closed(holes, [*bridged, *narrow], samples, length, grid.unit)
+        crushed = crushed_parts(grid, samples, found, length)
+        too_frayed = frayed(crushed, found, followed, members)
         too_sparse, sparse = sparse_parts(samples, found, members, settings.allow_missing)
         return replace(
             self.certificate,
@@ -126,6 +128,7 @@ class Judged:
             faults=(
                 *self.certificate.faults,
                 *too_sparse,
+                *too_frayed,
                 *beyond,
                 *bare,
                 *(each for each in bridged if each.kind == "bridged"),
@@ -142,7 +145,7 @@ class Judged:
                 *aside,
                 *beside,
                 *peaks,
-                *crushed_parts(grid, samples, found, length),
+                *crushed,
                 *places,
             ),
             **offsets,
@@ -227,10 +230,12 @@ def _apart(grid: Grid, samples: SurfaceSamples, found: Distances, length: float)
     in_reach = known <= COVER_REACH * at_triangles[np.isfinite(found.triangles)]
     beyond = points_missed(samples, found.scan, COVER_REACH * members)
     left_out = parts_left_out(samples, found, members, COVER_REACH * members)
+    of_rods = sum(part.share for part in left_out if part.kind == "rods")
     return {
         "points": len(samples.scan),
         "left_out": left_out,
-        "missing": max(0.0, float(beyond.mean()) - sum(part.share for part in left_out if part.kind == "pieces")),
+        "missing": max(0.0, float(beyond.mean()) - sum(part.share for part in left_out if part.kind == "pieces"))
+        + (of_rods if of_rods > MOST_OF_RODS else 0.0),
         "scan_within_reach": float((found.scan <= COVER_REACH * members).mean()),
         "grid_within_reach": float(in_reach.mean()) if len(known) else 1.0,
         "scan_distance": _spread(found.scan, samples.scan, grid, length / members),

@@ -31,6 +31,8 @@ AROUND_POINTED = 0.75
 # true corners and tips 0.4 at most
 OFF_AT_POINT, MOSTLY_OFF = 0.1, 0.42
 FEWEST_AT_POINT = 12  # fewest such points
+# such nodes from which on a grid is frayed, and the share of the scan farther than a member from it that is missed beside them
+FRAYED_FROM, FRAYED_MISSES = 6, 0.002
 
 
 def spikes(grid: Grid, samples: SurfaceSamples, found: Distances, length: float) -> list[Fault]:
@@ -52,6 +54,23 @@ def crushed_parts(grid: Grid, samples: SurfaceSamples, found: Distances, length:
     nodes = crushed[~_stands_on_sheet(crushed, axes, grid, samples, length)]
     words = "crushes a part of the scan that is narrow for its members, as a foot or a knob"
     return _said("crushed", words, grid, nodes, "; shorter members follow it")
+
+
+def frayed(crushed: list[Fault], found: Distances, followed: np.ndarray, members: np.ndarray) -> list[Fault]:
+    """Return a fault where a grid comes to a point at many places and misses the scan beside them, as a lip that its edge jumps along.
+
+    Parameters
+    ----------
+    crushed : what `crushed_parts` returns
+    followed : (N,) bool, points that the grid is to follow
+    members : (N,) desired member length at each point [scan unit]
+    """
+    missed = float(np.mean(followed & (found.scan > members)))
+    if missed < FRAYED_MISSES or not any(len(each.also) + 1 >= FRAYED_FROM for each in crushed):
+        return []
+    worst = crushed[0]
+    words = f"is frayed at {len(worst.also) + 1} places, where it comes to a point and misses {missed:.1%} of the scan"
+    return [Fault("frayed", words, worst.where, worst.also)]
 
 
 def _crushed_nodes(

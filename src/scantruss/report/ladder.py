@@ -41,8 +41,7 @@ MOST_MEMBERS = 60_000  # members of a grid that is made to try a length
 CLOSE_BEND = 0.95  # share of the scan that is less bent than the radius that is named
 # lengths one after the other, all of whose grids are far from passing or fail by their fronts, after which no other nearby is tried
 HOPELESS_NEARBY = 4
-HOPELESS_LENGTHS = (
-    3  # lengths that were tried from which on only longer ones are looked at where there is no hope for any
-)
+# lengths that were tried from which on only longer ones are looked at where there is no hope for any
+HOPELESS_LENGTHS = 3
 # lengths that are tried beside the usual one where none of these passes, as multiples of it
 BESIDE_USUAL = (1.12, 0.9, 1.25)

@@ -84,8 +84,12 @@ def mean_normals(normals: np.ndarray, neighbors: np.ndarray, facing: float) -> n
     return means
 
 
-def face_outside(mean: np.ndarray, normals: np.ndarray, piece: np.ndarray, neighbors: np.ndarray) -> None:
+def face_outside(
+    mean: np.ndarray, normals: np.ndarray, piece: np.ndarray, neighbors: np.ndarray, *, z_is_up: bool = False
+) -> None:
     """Turn the normals of each piece, numbered from 0 (S,), away from its centre; upwards if that does not decide (a plate).
+
+    Where z is up a piece that faces up or down on the whole faces up: a quarry too, whose centre lies above it.
 
     The centre of a body that is open somewhere, as a figure without the underside of its base, is that of its edge: seen from there what
     is missing faces neither way, and the sum of all others is three times its volume.
@@ -101,7 +105,9 @@ def face_outside(mean: np.ndarray, normals: np.ndarray, piece: np.ndarray, neigh
     bulge = np.bincount(piece, dots(arm, normals)) / count
     for i in range(len(count)):
         side = bulge[i]
-        if abs(side) < 0.01 * max(size[i], 1e-300):
+        if z_is_up and abs(up[i, 2]) >= FACING_OF_BODY:
+            side = up[i, 2]
+        elif abs(side) < 0.01 * max(size[i], 1e-300):
             side = next((up[i, c] for c in (2, 1, 0) if abs(up[i, c]) > 1e-6), 1.0)
         if side < 0:
             normals[piece == i] *= -1.0

@@ -14,11 +14,12 @@ PATCH_POINTS_ON_THE_WAY = 8.0  # most points per sample to which a patch is fitt
 
 
 def faced_surface(
-    found: Linked, radius: float, length: float, spacing: float, sharp_edges: bool = False
+    found: Linked, radius: float, length: float, spacing: float, sharp_edges: bool = False, z_is_up: bool = False
 ) -> tuple[Surface, np.ndarray, np.ndarray]:
     """Return the local surface of linked samples, its normals facing outwards; the piece of each (S,), and whether it lies on an edge.
 
     sharp_edges : whether samples on sharp edges of bodies face away from them
+    z_is_up : whether what faces up or down on the whole faces up
     """
     mean, normals, neighbors = found.mean, found.normals, found.neighbors
     normal_kernels.trust_thin_samples(mean, normals, neighbors, found.thickness, ROUGH_SAMPLE * length, STEEP_SINE)
@@ -28,7 +29,7 @@ def faced_surface(
     if len(found.facing):
         face_as_given(normals, found.facing)
     normals = mean_normals(normals, neighbors, 0.7)
-    face_outside(mean, normals, piece, neighbors)
+    face_outside(mean, normals, piece, neighbors, z_is_up=z_is_up)
     surface = Surface(
         points=found.grouped,
         start=found.start,

@@ -389,5 +389,7 @@ def _prepare(
 
 def _faced(chosen: ChosenSamples, spacing: float, asked: Asked) -> tuple[Surface, np.ndarray, np.ndarray]:
     """Return the surface of the samples with its length field; each one's piece, and whether it lies on a sharp edge."""
-    surface, piece, on_edge = faced_surface(chosen.found, chosen.radius, asked.length, spacing, asked.sharp_edges)
+    surface, piece, on_edge = faced_surface(
+        chosen.found, chosen.radius, asked.length, spacing, asked.sharp_edges, asked.z_is_up
+    )
     return surface._replace(field=length_field(surface, asked.wish)), piece, on_edge
