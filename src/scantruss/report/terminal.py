@@ -81,21 +81,25 @@ def print_lines(lines: list[str]) -> None:
 
 
 def print_table(head: tuple[str, ...], rows: Sequence[tuple[str, ...]]) -> None:
-    """Print a table: drawn by rich on a terminal, plain columns elsewhere."""
+    """Print a table, words to the left and figures to the right: drawn by rich on a terminal, plain columns elsewhere."""
     if quiet:
         return
+    texts = [i == 0 or any(row[i][:1].isalpha() for row in rows) for i in range(len(head))]
     if sys.stdout.isatty():
         from rich.console import Console
         from rich.table import Table
 
         table = Table(*head, box=None, pad_edge=False)
-        for column in table.columns[1:]:
-            column.justify = "right"
+        for column, is_text in zip(table.columns, texts, strict=True):
+            column.justify = "left" if is_text else "right"
         for row in rows:
             table.add_row(*row)
         Console().print(table)
         return
     widths = [max(len(row[i]) for row in [head, *rows]) for i in range(len(head))]
     for row in [head, *rows]:
-        cells = [row[0].ljust(widths[0]), *(cell.rjust(width) for cell, width in zip(row[1:], widths[1:], strict=True))]
+        cells = [
+            cell.ljust(width) if is_text else cell.rjust(width)
+            for cell, width, is_text in zip(row, widths, texts, strict=True)
+        ]
         print("  ".join(cells).rstrip())
