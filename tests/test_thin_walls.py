@@ -11,7 +11,7 @@ from marks import compiled_only
 from numpy.typing import NDArray
 
 import scantruss as st
-from scantruss.attempts.looks import follows_more, jumps_between_walls
+from scantruss.attempts.looks import ROUGH_SCAN, AskedScan, follows_more, jumps_between_walls
 from scantruss.attempts.table import attempts
 from scantruss.constraints.ridges import find_ridges
 from scantruss.kernels.geometry.boxes import new_boxes
@@ -74,6 +74,13 @@ def test_thin_walls_are_tried_where_there_are_some() -> None:
     plate = np.random.default_rng(0).random((4_000, 3)) * (12.0, 12.0, 0.02)
     settings = st.Settings(length=1.0)
     assert not any(attempt.settings.thin_walls for attempt in attempts(st.PointCloud.from_array(plate), settings))
+
+
+def test_walls_of_which_hardly_a_sample_is_rough_are_tried_too() -> None:
+    """At two thirds of a member few samples hold points of both sides; no grid passes all the same, where these lie at its lip."""
+    look = AskedScan(st.PointCloud.from_array(pot()[0]), st.Settings(length=0.75))
+    assert look.rough < ROUGH_SCAN and look.has_thin_walls
+    assert not AskedScan(st.PointCloud.from_array(pot()[0]), st.Settings(length=0.5)).has_thin_walls
 
 
 def test_samples_of_thin_walls_are_close_but_not_as_close_as_the_points() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -15,8 +16,9 @@ from scantruss.boundary.find import find_boundary
 from scantruss.check.unfollowed import crests_cut_off
 from scantruss.constraints.find import wide_folds
 from scantruss.constraints.ridges import find_ridges, fold_lines
+from scantruss.errors import FrontError
 from scantruss.grid.certificate import Fault
-from scantruss.pipeline import make_grid
+from scantruss.pipeline import make_grid, with_wide_ridges
 from scantruss.surface.samples import sample_surface
 
 SIZE, HALF = 5.0, 20.0  # member length, half the side of the box
@@ -100,3 +102,25 @@ def test_nearer_counts_against_poorer_and_unevener() -> None:
     uneven = near.replace(nodes=longer)
     assert not follows_better(uneven, far)
     assert not follows_better(grid.replace(certificate=None), far)
+
+
+def test_the_wide_folds_beside_which_a_grid_fails_are_given_up_alone(
+    cloud: PointCloud, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    settings = Settings(length=SIZE)
+    attempt = Attempt(settings)
+    folds = wide_folds(find_boundary(sample_surface(cloud, settings), settings)[0], settings)
+    bad = folds[0][len(folds[0]) // 2] + cloud.origin
+    made: list[tuple[int, ...]] = []
+
+    def make(_: PointCloud, tried: Attempt, **__: object) -> Grid:
+        made.append(tried.wide)
+        if 0 in tried.wide:
+            raise FrontError("it fails", None, tuple(bad.tolist()))
+        return cast(Grid, "a grid")
+
+    monkeypatch.setattr("scantruss.pipeline.make_grid", make)
+    every = tuple(range(len(folds)))
+    grid, wide = with_wide_ridges(cloud, replace(attempt, wide=every), None)
+    assert grid == "a grid" and made == [every, wide] and 0 not in wide and len(wide) >= len(every) - 3
+    assert with_wide_ridges(cloud, replace(attempt, wide=(0,)), None) == (None, ())

@@ -182,14 +182,14 @@ def make_grid_with_wide_ridges(cloud: PointCloud, attempt: Attempt, *, progress:
     every = tuple(sorted({*made, *crests_cut_off(plain, crests, settings.length)}))
     tried = {every: follows_better, made: follows_ridges_as_well}  # the second alone where both are the same
     for wide, is_taken in tried.items():
-        folded, wide_taken = _with_wide_ridges(cloud, replace(first, wide=wide), seen) if wide else (None, ())
+        folded, wide_taken = with_wide_ridges(cloud, replace(first, wide=wide), seen) if wide else (None, ())
         if folded is not None and is_taken(folded, plain):
             with suppress(FrontError):
                 return make_grid(cloud, replace(attempt, wide=wide_taken), progress=progress) if is_long else folded
     return make_grid(cloud, attempt, progress=progress) if is_long else plain
 
 
-def _with_wide_ridges(
+def with_wide_ridges(
     cloud: PointCloud, attempt: Attempt, progress: Progress | None
 ) -> tuple[Grid | None, tuple[int, ...]]:
     """Return the grid with ridges along wide folds, and which; where it fails beside some, without those; None where that fails too."""

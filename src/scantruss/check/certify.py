@@ -26,7 +26,7 @@ from .handles import false_struts
 from .hanging import hanging_nodes, nodes_off_sheets
 from .irregular import count_irregular
 from .left_out import asked_for, closed_holes, first_and_more, parts_left_out, without_caps
-from .limits import COVER_REACH, MOST_OF_RODS, limits_of, mostly_rounded, places_to_look_at, widened_limits
+from .limits import COVER_REACH, limits_of, mostly_rounded, places_to_look_at, widened_limits
 from .missed import farthest_followed, largest_patch_missed, points_missed, shares_rounded
 from .openings import boundary_faults
 from .refusal import passed_grid
@@ -230,12 +230,10 @@ def _apart(grid: Grid, samples: SurfaceSamples, found: Distances, length: float)
     in_reach = known <= COVER_REACH * at_triangles[np.isfinite(found.triangles)]
     beyond = points_missed(samples, found.scan, COVER_REACH * members)
     left_out = parts_left_out(samples, found, members, COVER_REACH * members)
-    of_rods = sum(part.share for part in left_out if part.kind == "rods")
     return {
         "points": len(samples.scan),
         "left_out": left_out,
-        "missing": max(0.0, float(beyond.mean()) - sum(part.share for part in left_out if part.kind == "pieces"))
-        + (of_rods if of_rods > MOST_OF_RODS else 0.0),
+        "missing": max(0.0, float(beyond.mean()) - sum(part.share for part in left_out if part.kind == "pieces")),
         "scan_within_reach": float((found.scan <= COVER_REACH * members).mean()),
         "grid_within_reach": float(in_reach.mean()) if len(known) else 1.0,
         "scan_distance": _spread(found.scan, samples.scan, grid, length / members),

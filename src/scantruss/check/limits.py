@@ -32,8 +32,6 @@ LIMBS_KEPT = "shorter members keep limbs, which must be three of them round"
 PLACES_KEPT = 30  # places of a fault that are kept, the worst first
 # distance within which a point of the scan and a triangle are in reach of each other [member lengths]
 COVER_REACH = 0.5
-# share of the scan set aside as columns from which on it counts as missing: so much is a tower or a wing
-MOST_OF_RODS = 0.1
 ROUNDED_BY = 0.25  # distance from the grid above which a point is rounded off [member lengths]
 # share of the points that are rounded off above which it is a fault: 0.23 where nodes jump between two layers, 0.16 at most on others
 MOST_ROUNDED = 0.2
