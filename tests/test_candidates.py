@@ -25,8 +25,11 @@ from scantruss.check.certify import Judged, judge
 from scantruss.constraints.find import find_constraints
 from scantruss.errors import CertificateError, FrontError
 from scantruss.front.orientation_field import orientation_fields
+from scantruss.grid.certificate import Fault
 from scantruss.improve.candidate import grid_of as grid_of_candidate
-from scantruss.improve.optimize import improve_last
+from scantruss.improve.longer_search import FREE_TURNS, SPARING_TURNS, search_on
+from scantruss.improve.optimize import improve_last, searched_again
+from scantruss.improve.working_mesh import WorkingMesh
 from scantruss.runtime import parallel
 from scantruss.scan.formats.writing import write_points
 from scantruss.surface.samples import sample_surface
@@ -308,12 +311,44 @@ def test_a_grid_with_ridges_is_searched_on_and_is_in_no_figure_worse() -> None:
     improved = candidates.improve_fronts(fronts, samples, boundary, constraints, settings)
     best = candidates.chosen(candidates.those_that_pass(improved, samples, boundary, constraints, settings))
     usual = grid_of_candidate(best)
-    candidates.even_out_ridges(best, samples, boundary, constraints, settings)
+    search_on(best, samples, boundary, constraints, settings, usual.quality.shape_mean)
     even = grid_of_candidate(best)
     theirs, found = (known(known(grid.certificate).scan_distance) for grid in (usual, even))
     assert len(even.lines) > 0 and known(even.certificate).passed
     assert even.quality.length_cv < usual.quality.length_cv and even.quality.shape_mean >= usual.quality.shape_mean
     assert found.p95 <= theirs.p95 and found.p99 <= theirs.p99
+
+
+@compiled_only
+def test_a_longer_search_spares_the_places_of_its_faults_and_begins_again_from_its_last_good_grid(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The second half of the turns all fail at one place: each of them begins from the same grid, and those after the first spare it."""
+    cloud = st.PointCloud.from_array(cap(4.0, 1.0, 0.25))
+    settings = st.Settings(length=1.0)
+    steps = steps_of(cloud, settings)
+    fields = orientation_fields(steps.samples, steps.boundary, settings)
+    improved = candidates.improve_fronts(candidates.advance_fronts(*steps, fields, settings), *steps, settings)
+    best = candidates.chosen(candidates.those_that_pass(improved, *steps, settings))
+    begun: list[tuple[bytes, list[int]]] = []
+    fault = Fault("torn", "is torn", (0.5, 0.25, 0.0))
+
+    def searched(mesh: WorkingMesh, *others: Any) -> st.Grid:
+        begun.append((mesh.net.nodes.tobytes(), [len(each.places) for each in others[-2]]))
+        return searched_again(mesh, *others)
+
+    def check(grid: st.Grid, *others: Any) -> Any:
+        now = judge(grid, *others)
+        fails = len(begun) > FREE_TURNS
+        return replace(now, certificate=replace(now.certificate, faults=(fault,))) if fails else now
+
+    monkeypatch.setattr("scantruss.improve.longer_search.searched_again", searched)
+    monkeypatch.setattr("scantruss.improve.longer_search.judged", check)
+    search_on(best, *steps, settings, 0.0)
+    sparing = begun[FREE_TURNS:]
+    assert len({nodes for nodes, _ in sparing}) == 1
+    assert [spared for _, spared in sparing] == [[k, 0] for k in range(SPARING_TURNS)]
+    assert known(grid_of_candidate(best).certificate).passed
 
 
 def test_fronts_that_would_all_miss_the_same_limbs_are_not_tried() -> None:

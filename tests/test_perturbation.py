@@ -8,7 +8,7 @@ import pytest
 from rough import Rough, rough_disc, rough_sphere, same_topology
 
 from scantruss.improve.equalize import MEAN_LENGTH_WEIGHT, energy_of_node, new_scratch, settle
-from scantruss.improve.perturbation import new_area, search_widely
+from scantruss.improve.perturbation import LONGER, Spared, new_area, search_widely
 from scantruss.improve.working_mesh import LENGTH_WEIGHT, WorkingMesh
 from scantruss.kernels.mesh import perturbation as kernels
 from scantruss.kernels.mesh.grid import LOCKED, Net
@@ -189,3 +189,17 @@ def test_a_net_is_as_before_until_a_member_of_the_area_changes(
         changed += made > 0 and not same
         kernels.put_area_back(net, mesh.patches, area)
     assert changed > 3
+
+
+def test_no_perturbation_begins_near_places_that_are_spared(settled: tuple[Rough, WorkingMesh, Scratch, Area]) -> None:
+    """Where they are all of the grid it keeps its members; where they are a node, those that are far from it change."""
+    _, mesh, _, _ = settled
+    net, place = mesh.net, mesh.net.nodes[np.flatnonzero(mesh.net.degree > 0)[:1]]
+    assert Spared(place, 0.5).away(place + [[0.0, 0.0, 0.4]]).tolist() == [False]
+    assert Spared(place, 0.5).away(place + [[0.0, 0.0, 0.6]]).tolist() == [True]
+    assert Spared(np.empty((0, 3)), 0.5).away(place).tolist() == [True]
+    before = net.ring.copy(), net.degree.copy()
+    search_widely(mesh, LONGER, spared=[Spared(place, 100.0)])
+    assert (net.ring == before[0]).all() and (net.degree == before[1]).all()
+    search_widely(mesh, LONGER, spared=[Spared(place, 0.1 * mesh.length)])
+    assert (net.degree != before[1]).any()

@@ -12,8 +12,8 @@ from .errors import CertificateError, FrontError
 from .front.advance import advance_front
 from .front.orientation_field import Field, FieldStart, orientation_fields
 from .improve.candidate import Candidate, grid_of, judged, misses_at_most
-from .improve.optimize import improve_first, improve_last, searched_again
-from .improve.perturbation import BESIDE_RIDGES
+from .improve.longer_search import is_no_worse, search_on
+from .improve.optimize import improve_first, improve_last
 from .improve.tip_search import MOST_MISSED, reach_tips_of
 from .runtime.parallel import threaded_map
 from .runtime.progress import Progress, WatchedProgress, seer_of
@@ -27,10 +27,6 @@ if TYPE_CHECKING:
     from .surface.samples import SurfaceSamples
 
 FULLY_IMPROVED = {"quick": 1, "normal": 1, "best": 3}  # fronts that are improved to the end
-MISSED_MORE = 0.002  # share of the scan that the grid of a longer search may miss beyond that of a shorter one
-TURNS_OF_SEARCH = 12  # times that the grid of effort `normal` is searched again where none of `best` is better
-TURNS_BESIDE_RIDGES = 18  # times that the grid of `best` is searched again beside its ridges
-LEAST_EVENED = 0.001  # fall of the variation of the lengths that is worth another grid there
 FINALIST_BATCHES = 2  # times that finalists are tried
 
 
@@ -193,7 +189,7 @@ def no_worse(
     *,
     progress: Progress | None = None,
 ) -> Grid:
-    """Return the best grid that is in no figure worse than that of effort `normal`; where there is none, that one, searched on.
+    """Return the best grid that is in no figure worse than that of effort `normal`, or that one, searched on.
 
     Raises
     ------
@@ -205,61 +201,14 @@ def no_worse(
     fronts = advance_fronts(samples, boundary, constraints, fields, lower)
     improved = improve_fronts(fronts, samples, boundary, constraints, lower)
     usual = chosen(those_that_pass(improved, samples, boundary, constraints, lower))
-    better = []
+    better, least_shape = [], grid_of(usual).quality.shape_mean
     with suppress(FrontError):
         passed = those_that_pass(candidates, samples, boundary, constraints, settings, progress=progress)
-        better = [each for each in passed if _is_no_worse(grid_of(each), grid_of(usual))]
+        better = [each for each in passed if is_no_worse(grid_of(each), grid_of(usual))]
     best = chosen(better) if better else usual
-    if best.mesh.sharp.any():
-        even_out_ridges(best, samples, boundary, constraints, lower)
-    elif not better:
-        search_on(best, samples, boundary, constraints, lower)
+    if best.mesh.sharp.any() or not better:  # elsewhere its own search leaves little
+        search_on(best, samples, boundary, constraints, lower, least_shape)
     return grid_of(best).replace(settings=settings)
-
-
-def even_out_ridges(
-    candidate: Candidate, samples: SurfaceSamples, boundary: Boundary, constraints: Constraints, settings: Settings
-) -> None:
-    """Search a grid on that passes and follows ridges: beside them the usual search leaves most of its irregular nodes."""
-    usual, grid = candidate.judged, grid_of(candidate)
-    search_on(candidate, samples, boundary, constraints, settings, BESIDE_RIDGES, TURNS_BESIDE_RIDGES)
-    if grid.quality.length_cv - grid_of(candidate).quality.length_cv < LEAST_EVENED:
-        candidate.judged, candidate.grid = usual, grid
-
-
-def search_on(
-    candidate: Candidate,
-    samples: SurfaceSamples,
-    boundary: Boundary,
-    constraints: Constraints,
-    settings: Settings,
-    way: str = "normal",
-    turns: int = TURNS_OF_SEARCH,
-) -> None:
-    """Search a grid that passes again and again in a way of `PERTURBATIONS`, and take the most even one that is in no figure worse."""
-    usual = grid_of(candidate)
-    for _ in range(turns):
-        grid = searched_again(candidate.mesh, candidate.front, samples, constraints, candidate.settings, way)
-        now = judged(grid, samples, boundary, settings)
-        grid = now.checked_grid
-        passes = now.certificate.passed and _is_no_worse(grid, usual)
-        if passes and grid.quality.length_cv < grid_of(candidate).quality.length_cv:
-            candidate.take(now)
-    candidate.end()
-
-
-def _is_no_worse(grid: Grid, other: Grid) -> bool:
-    """Whether a grid is as even, as regular and as near to the scan as another, and reaches as much of it."""
-    one, two = grid.certificate, other.certificate
-    if one is None or two is None or one.scan_distance is None or two.scan_distance is None:
-        return True
-    return (
-        grid.quality.length_cv <= other.quality.length_cv
-        and grid.quality.shape_mean >= other.quality.shape_mean
-        and one.scan_distance.p95 <= two.scan_distance.p95
-        and one.scan_distance.p99 <= two.scan_distance.p99
-        and one.missing <= two.missing + MISSED_MORE
-    )
 
 
 def optimize_fronts(

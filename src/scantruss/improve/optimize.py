@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,7 +17,7 @@ from .fixed_nodes import fix_nearest_nodes, fix_nodes, hold_nodes
 from .flips import flip_edges
 from .mend import mend_poor_places
 from .off_scan import put_on_scan
-from .perturbation import BESIDE_RIDGES, search_widely
+from .perturbation import LONGER, Spared, search_widely
 from .sliding_nodes import with_boundary_members, with_line_sets
 from .smoothing import smooth
 from .working_mesh import WorkingMesh
@@ -141,10 +141,12 @@ def searched_again(
     constraints: Constraints,
     settings: Settings,
     way: str = "normal",
+    spared: Sequence[Spared] = (),
+    turn: int = 0,
 ) -> Grid:
     """Return the grid of a mesh that was put down, searched again in a way of `PERTURBATIONS`, as new nodes leave others uneven."""
-    mesh = mesh.beside_ridges() if way == BESIDE_RIDGES else mesh
-    search_widely(mesh, way)
+    mesh = mesh.for_longer_search() if way == LONGER else mesh
+    search_widely(mesh, way, spared=spared, turn=turn)
     return put_down(mesh, front, samples, constraints, settings)
 
 

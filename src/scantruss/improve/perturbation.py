@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -21,7 +21,7 @@ from .equalize import FARTHEST_ON_THE_WAY, MEAN_LENGTH_WEIGHT, Terms, new_scratc
 from .partition import Partition
 from .working_mesh import WorkingMesh
 
-BESIDE_RIDGES = "beside ridges"  # the way to search a grid on that follows ridges
+LONGER = "longer"  # the way to search a grid on that passes
 
 
 class Annealing(NamedTuple):
@@ -31,11 +31,24 @@ class Annealing(NamedTuple):
     temperature: float  #: energy that a perturbation may cost in the first round, on average
 
 
-PERTURBATIONS = {  # for each effort, and for the search after it beside ridges
+class Spared(NamedTuple):
+    """Places at which no perturbation begins."""
+
+    places: np.ndarray  #: (K, 3)
+    reach: float  #: distance from one of them within which none does [scan unit]
+
+    def away(self, nodes: np.ndarray) -> np.ndarray:
+        """Whether each of some nodes (C, 3) lies farther than that from all of them."""
+        from scipy.spatial import cKDTree  # which grids of less effort do not load
+
+        return cKDTree(self.places).query(nodes, distance_upper_bound=self.reach)[0] > self.reach
+
+
+PERTURBATIONS = {  # for each effort, and for the search after it
     "quick": Annealing(0, 0.0),
     "normal": Annealing(6, 0.0),
     "best": Annealing(40, 0.2),
-    BESIDE_RIDGES: Annealing(8, 0.2),
+    LONGER: Annealing(8, 0.2),
 }
 NODES_OF_LARGE_GRID = 700  # nodes above which `normal` perturbs once, in parts: there the boundary matters little
 MOST_PARTITIONS = 2  # most times that a large grid is perturbed in parts
@@ -64,11 +77,20 @@ def new_area(mesh: WorkingMesh, number: int = 0) -> Area:
     )
 
 
-def search_widely(mesh: WorkingMesh, way: str, progress: Callable[[float], None] | None = None) -> None:
+def search_widely(
+    mesh: WorkingMesh,
+    way: str,
+    progress: Callable[[float], None] | None = None,
+    *,
+    spared: Sequence[Spared] = (),
+    turn: int = 0,
+) -> None:
     """Perturb the grid at its irregular nodes, search from there, and keep what lowers the energy.
 
-    way : of `PERTURBATIONS`; with `best` and beside ridges the energy may rise a little at first, and less and less later on
+    way : of `PERTURBATIONS`; with `best` and the longer search the energy may rise a little at first, and less and less later on
         (simulated annealing)
+    spared : where the grid is left alone
+    turn : number of this search, each of which makes other random moves
     """
     rounds, temperature = PERTURBATIONS[way]
     if not rounds:
@@ -76,13 +98,15 @@ def search_widely(mesh: WorkingMesh, way: str, progress: Callable[[float], None]
     if way == "normal" and mesh.net.used > NODES_OF_LARGE_GRID:
         perturb_in_parts(mesh)
     else:
-        room = new_scratch(mesh), new_area(mesh)
+        room = new_scratch(mesh), new_area(mesh, turn)
         for done in range(rounds):
             if progress:
                 progress(0.6 + 0.2 * done / rounds)
             cooled = temperature * max(0.0, 1.0 - done / (HOT_ROUNDS * rounds))
             allowance = ALLOWANCE_SEARCHED + ALLOWANCE_PER_TEMPERATURE * cooled if temperature else ALLOWANCE_SETTLED
             waiting = np.ones(len(mesh.net.arc), np.bool_)
+            for each in spared:
+                waiting &= each.away(mesh.net.nodes)
             perturb_mesh(mesh, mesh.net, room, waiting, terms_of(mesh, room[0]), cooled, allowance)
             mesh.renew(FARTHEST_ON_THE_WAY)
     settle_again(mesh)

@@ -24,8 +24,8 @@ from .sliding_nodes import find_on_lines, inner_lines, joined
 
 NEAR_IN_THE_END = 0.25  # largest distance of a node from the centre of its patch in the end [member lengths]
 LENGTH_WEIGHT = 1.0  # weight of the lengths of members against the shapes of triangles
-WEIGHT_BESIDE_RIDGES = 3.0  # the same in the longer search of a grid with ridges
-FOLDS_BESIDE_RIDGES = 0.2  # weight of the distances from folds there
+WEIGHT_OF_LONGER_SEARCH = 3.0  # the same in the longer search of a grid that passes
+FOLDS_OF_LONGER_SEARCH = 0.2  # weight of the distances from folds there
 NODES_PER_THREAD = 300  # fewest nodes worth a thread of their own
 PROJECTION_PARTS = 3  # parts per thread in projection, as nodes at the boundary take less time
 LARGEST_DEGREE = 12  # most neighbours of a node while the grid is improved, unless it had more
@@ -185,14 +185,14 @@ class WorkingMesh:
         mesh.renew(0.0)
         return mesh
 
-    def beside_ridges(self) -> WorkingMesh:
+    def for_longer_search(self) -> WorkingMesh:
         """The same mesh, which shares its arrays, for a search in which lengths and the folds of the scan count for more.
 
-        Between the chains of ridges members are too long or too short where triangles are still in shape; and what the chains follow
-        lies at folds, from which a longer search would move away.
+        Between the chains of ridges members are too long or too short where triangles are still in shape; and a longer search would
+        move away from folds.
         """
-        folds = max(self.folds, FOLDS_BESIDE_RIDGES)
-        mesh = replace(self, length_weight=WEIGHT_BESIDE_RIDGES, folds=folds)
+        folds = max(self.folds, FOLDS_OF_LONGER_SEARCH)
+        mesh = replace(self, length_weight=WEIGHT_OF_LONGER_SEARCH, folds=folds)
         mesh.renew(0.0)
         return mesh
 

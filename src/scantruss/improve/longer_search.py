@@ -1,0 +1,116 @@
+"""A longer search of a grid that passes, in turns: each leaves alone the places where one before it went wrong."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..check.distances import distances_to_grid
+from .candidate import Candidate, grid_of, judged
+from .optimize import searched_again
+from .perturbation import LONGER, Spared
+
+if TYPE_CHECKING:
+    from ..boundary.find import Boundary
+    from ..check.certify import Judged
+    from ..constraints.find import Constraints
+    from ..grid.grid import Grid
+    from ..settings import Settings
+    from ..surface.samples import SurfaceSamples
+
+FREE_TURNS, SPARING_TURNS = 18, 18  # times that a grid is searched again, and again where places are spared
+LEAST_EVENED = 0.001  # fall of the variation of the lengths that is worth another grid
+MISSED_MORE = 0.002  # share of the scan that the grid of a longer search may miss beyond that of a shorter one
+LEAST_FARTHER = 0.05  # by how much farther from the grid than before a place of the scan is lost [member lengths]
+# distance from a fault, and from a place that was lost, within which no later turn begins [member lengths]
+SPARED_AT_FAULT, SPARED_AT_LOSS = 3.0, 1.5
+LEAST_OF_WORST = 0.9  # shape quality of the worst triangle that is left at least, in that of before
+FAR_PLACES = 0.95  # share of the places of the scan that are nearer to the grid than one that counts as lost
+
+_NOWHERE = np.empty((0, 3))
+
+
+def search_on(
+    candidate: Candidate,
+    samples: SurfaceSamples,
+    boundary: Boundary,
+    constraints: Constraints,
+    settings: Settings,
+    least_shape: float,
+) -> None:
+    """Search a grid that passes again and again, and take the most even one that is as near to the scan and as regular as asked for.
+
+    The first turns go on from each other, whatever comes of them. Then it is searched on from the grid taken: a turn that ends in a fault
+    or farther from the scan is taken back, and the places where it went wrong are spared from then on. Most of them are tips, limbs and
+    clefts about a member wide, which hold up all the rest.
+
+    least_shape : mean shape quality below which no grid is taken
+    """
+    mesh, first, usual = candidate.mesh, candidate.judged, grid_of(candidate)
+    kept, off, faulty, lost = mesh.copied(), _distances_off(usual, samples), _NOWHERE, _NOWHERE
+    for turn in range(FREE_TURNS + SPARING_TURNS):
+        is_sparing = turn >= FREE_TURNS
+        if turn == FREE_TURNS:
+            mesh.restore(kept)
+        spared = Spared(faulty, SPARED_AT_FAULT * mesh.length), Spared(lost, SPARED_AT_LOSS * mesh.length)
+        number = turn - FREE_TURNS + 1 if is_sparing else 0
+        grid = searched_again(mesh, candidate.front, samples, constraints, candidate.settings, LONGER, spared, number)
+        now = judged(grid, samples, boundary, settings)
+        grid = now.checked_grid
+        if now.certificate.passed and is_as_near(grid, usual):
+            evener = grid.quality.length_cv < grid_of(candidate).quality.length_cv
+            taken = evener and grid.quality.shape_mean >= least_shape and _is_no_poorer(now, first)
+            if taken:
+                candidate.take(now)
+            if taken or is_sparing:
+                kept = mesh.copied()
+        elif is_sparing:
+            mesh.restore(kept)
+            wrong = [place for fault in now.certificate.faults for place in (fault.where, *fault.also) if place]
+            if wrong:
+                faulty = np.concatenate([faulty, np.array(wrong) - samples.origin])
+            else:
+                away = _distances_off(grid, samples)
+                is_lost = (away > off + LEAST_FARTHER) & (away > np.quantile(off, FAR_PLACES))
+                lost = np.concatenate([lost, _places(samples)[is_lost]])
+    if usual.quality.length_cv - grid_of(candidate).quality.length_cv < LEAST_EVENED:
+        candidate.judged, candidate.grid = first, usual
+    else:
+        candidate.end()
+
+
+def _is_no_poorer(now: Judged, first: Judged) -> bool:
+    """Whether the worst triangle of a grid is hardly worse than that of the first one, and it has no more warnings."""
+    as_few = len(now.certificate.warnings) <= len(first.certificate.warnings)
+    return as_few and now.grid.quality.shape_min >= LEAST_OF_WORST * first.grid.quality.shape_min
+
+
+def is_as_near(grid: Grid, other: Grid) -> bool:
+    """Whether a grid is as near to the scan as another, and reaches as much of it."""
+    one, two = grid.certificate, other.certificate
+    if one is None or two is None or one.scan_distance is None or two.scan_distance is None:
+        return True
+    return (
+        one.scan_distance.p95 <= two.scan_distance.p95
+        and one.scan_distance.p99 <= two.scan_distance.p99
+        and one.missing <= two.missing + MISSED_MORE
+    )
+
+
+def is_no_worse(grid: Grid, other: Grid) -> bool:
+    """Whether a grid is as even, as regular and as near to the scan as another, and reaches as much of it."""
+    as_even = grid.quality.length_cv <= other.quality.length_cv
+    return as_even and grid.quality.shape_mean >= other.quality.shape_mean and is_as_near(grid, other)
+
+
+def _places(samples: SurfaceSamples) -> np.ndarray:
+    """Return the samples of the scan itself (K, 3)."""
+    return samples.surface.mean[: samples.measured][samples.kept[: samples.measured]]
+
+
+def _distances_off(grid: Grid, samples: SurfaceSamples) -> np.ndarray:
+    """Return how far `_places` lie off a grid (K,) [member lengths]."""
+    length = samples.surface.length
+    local = samples.surface.field[: samples.measured][samples.kept[: samples.measured]]
+    return distances_to_grid(_places(samples), grid, length)[0] / (length * local)
