@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 from small_clouds import sheet
@@ -10,7 +13,9 @@ from typed import known
 
 import scantruss as st
 from scantruss.check.certify import certified, certify
+from scantruss.check.crushed import frayed
 from scantruss.errors import CertificateError
+from scantruss.grid.certificate import Fault
 
 SETTINGS = st.Settings(length=1.0, ridge_angle=0.0)
 GABLE = 0.55  # rise of a roof for each unit across
@@ -69,3 +74,20 @@ def test_a_node_at_the_tip_of_a_cone_of_the_scan_is_neither_spike_nor_crushed() 
     samples, grid = scanned(points, grid.replace(nodes=nodes))
     found = certify(grid, samples, NOTHING, SETTINGS)
     assert not any(fault.kind in ("spike", "crushed") for fault in (*found.faults, *found.warnings))
+
+
+@pytest.mark.parametrize(
+    ("places", "far", "fails"), [(6, 0.003, True), (5, 0.003, False), (6, 0.001, False), (30, 0.2, True)]
+)
+def test_a_grid_crushed_at_many_places_that_misses_the_scan_is_frayed(places: int, far: float, fails: bool) -> None:
+    where = [(float(k), 0.0, 0.0) for k in range(places)]
+    crushed = [Fault("crushed", "crushes a part", where[0], tuple(where[1:]))]
+    away = np.where(np.arange(1000) < 1000 * far, 2.0, 0.1)
+    found: Any = SimpleNamespace(scan=away)
+    members, every = np.ones(1000), np.ones(1000, bool)
+    assert bool(frayed(crushed, found, every, members)) == fails
+    if fails:
+        (fault,) = frayed(crushed, found, every, members)
+        assert fault.words.startswith(f"is frayed at {places} places") and (fault.where, *fault.also) == tuple(where)
+    assert not frayed(crushed, found, away < 1.0, members)  # what is missed is none that is to be followed
+    assert not frayed([], found, every, members)

@@ -388,3 +388,12 @@ def test_samples_without_rods_are_those_with_them_where_a_scan_has_none() -> Non
     alone = sample_surface(PointCloud.from_array(plate), wanted.replace(keep_rods=False))  # found by themselves
     assert np.array_equal(alone.surface.mean, usual.surface.mean) and np.array_equal(alone.judged, usual.judged)
     assert np.array_equal(alone.surface.normals, usual.surface.normals) and alone.pieces == usual.pieces
+
+
+@pytest.mark.parametrize(("unit", "upwards"), [("m", True), ("", False)])
+def test_a_pit_faces_up_where_z_is_up_and_else_away_from_its_centre(unit: str, upwards: bool) -> None:
+    plan = np.random.default_rng(3).uniform(-10.0, 10.0, (8_000, 2))
+    pit = np.column_stack([plan, 0.03 * (plan**2).sum(axis=1)])
+    samples = sample_surface(PointCloud.from_array(pit, unit=unit), Settings(length=1.5))
+    facing = samples.surface.normals[:, 2]
+    assert ((facing > 0.0) == upwards).all()

@@ -48,6 +48,7 @@ def search_on(
     least_shape : mean shape quality below which no grid is taken
     """
     mesh, first, usual = candidate.mesh, candidate.judged, grid_of(candidate)
+    assert first is not None
     kept, off, faulty, lost = mesh.copied(), _distances_off(usual, samples), _NOWHERE, _NOWHERE
     for turn in range(FREE_TURNS + SPARING_TURNS):
         is_sparing = turn >= FREE_TURNS
