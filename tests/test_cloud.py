@@ -298,18 +298,3 @@ def test_the_extent_is_without_points_far_away() -> None:
     extent = cloud_lines(PointCloud.from_array(points))[1]
     assert "without 2 points far away" in extent and float(extent.split()[1]) < 100.1
     assert "far away" not in cloud_lines(PointCloud.from_array(points[:-2]))[1]
-
-
-@pytest.mark.parametrize(
-    ("shift", "unit", "is_up"),
-    [
-        ((0.0, 0.0, 0.0), "", False),
-        ((0.0, 0.0, 0.0), "m", True),
-        ((355_000.0, 4_180_000.0, 400.0), "", True),  # on a map
-        ((355_000.0, 0.0, 400.0), "", False),
-        ((5_000.0, 6_000.0, 0.0), "", False),  # beside the origin of its own frame
-        ((400_000.0, 400_000.0, 4_000_000.0), "", False),
-    ],
-)
-def test_z_is_up_in_units_of_surveys_and_on_maps(shift: tuple[float, ...], unit: str, is_up: bool) -> None:
-    assert PointCloud.from_array(bowl(500) + np.array(shift), unit=unit).z_is_up == is_up

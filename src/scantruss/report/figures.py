@@ -154,7 +154,10 @@ def line_lines(grid: Grid) -> list[str]:
             lines.append(f"{count}: {'; '.join(each)}")
     made = grid.settings
     if made is not None and made.ridge_angle > 0.0 and made.method == "default" and not sets_of(grid, RIDGE):
-        lines.append(f"no ridge: no sharp edge is folded to less than {180 - made.ridge_angle:g} degrees, 180 is level")
+        level, found = 180.0 - made.ridge_angle, grid.certificate
+        sharp = found is not None and found.sharpest_fold is not None and found.sharpest_fold.value < level
+        none = f": no sharp edge is folded to less than {level:g} degrees, 180 is level"
+        lines.append("no ridge is followed" if sharp else f"no ridge{none}")
     return lines
 
 

@@ -34,8 +34,6 @@ AT_NO_DATA = "with a height that stands for no data"
 AT_NO_DATA_PLACE = "at a place that stands for no data"
 LARGEST_COORDINATE = 1e100  # coordinates beyond this overflow when squared
 SURVEY_UNITS = ("m", "foot")  # scans in these have z up
-# both coordinates from which on a scan lies on a map, in its extents, each at least so many units
-FAR_ON_MAP, LEAST_ON_MAP = 100.0, 100.0
 SURVEY_FILES = (".las", ".laz", ".e57", ".pts", ".ptx")  # files of scans that have z up, whatever their unit
 MOST_COPIES = 5  # times that a scan may be stored with every point repeated
 POINTS_FOR_SPACING = 600  # points at which the spacing is measured
@@ -74,10 +72,8 @@ class PointCloud:
 
     @property
     def z_is_up(self) -> bool:
-        """Whether z certainly points upwards: in surveys of buildings and terrain, judged by their unit, file or coordinates."""
-        middle = np.abs(self.origin + np.mean(self.bounds, axis=0))
-        on_map = middle[:2].min() > FAR_ON_MAP * max(self.extent, LEAST_ON_MAP) and middle[2] < middle[:2].min()
-        return bool(self.unit in SURVEY_UNITS or self.name.lower().endswith(SURVEY_FILES) or on_map)
+        """Whether z certainly points upwards: in surveys of buildings and terrain, judged by their unit or file."""
+        return self.unit in SURVEY_UNITS or self.name.lower().endswith(SURVEY_FILES)
 
     @property
     def extent(self) -> float:
