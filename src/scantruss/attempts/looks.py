@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -42,6 +42,9 @@ NEARER_FOR_UNEVENER = 2.0
 # by how much the members of a grid that follows more ridges may be unevener, and how many times as far a hundredth of the points off it
 UNEVENER_BESIDE_RIDGES, FARTHER_BESIDE_RIDGES = 0.03, 1.1
 POOR_MEMBERS = {"angle", "short", "long", "folded"}  # kinds of warnings
+
+# what a scan shows of outliers, edges and slits it shows before limbs are cut off, which takes most of the time of its samples
+NO_LIMBS: dict[str, Any] = {"limb_girth": 0.0}
 
 
 class AskedScan:
@@ -88,7 +91,7 @@ class AskedScan:
         """Whether the scan is a body with thin limbs and slits, and one without them was not asked for."""
         if not self.by_default or self.asked.plain_body or self.asked.sharp_edges:
             return False
-        samples = sample_surface(self.cloud, self.asked.replace(plain_body=True))
+        samples = sample_surface(self.cloud, self.asked.replace(plain_body=True, **NO_LIMBS))
         return samples.measured < len(samples.surface.mean)
 
     @cached_property
@@ -214,13 +217,13 @@ def stands_on_columns(cloud: PointCloud, settings: Settings) -> bool:
 
 def _has_more_outliers(cloud: PointCloud, settings: Settings) -> bool:
     """Whether there are outliers that do not show where samples stand alone, as they are many or the members long."""
-    always = sample_surface(cloud, settings.replace(judge_outliers="always")).outliers
+    always = sample_surface(cloud, settings.replace(judge_outliers="always", **NO_LIMBS)).outliers
     return always > MANY_OUTLIERS * len(cloud.points) and always > sample_surface(cloud, settings).outliers
 
 
 def _has_sharp_edges(cloud: PointCloud, settings: Settings) -> bool:
     """Whether so many samples lie on sharp edges that these are to be looked at."""
-    on_edge = sample_surface(cloud, settings.replace(sharp_edges=True)).on_edge
+    on_edge = sample_surface(cloud, settings.replace(sharp_edges=True, **NO_LIMBS)).on_edge
     return bool(on_edge.sum() >= max(FEWEST_NEEDED, EDGE_SHARE * len(on_edge)))
 
 

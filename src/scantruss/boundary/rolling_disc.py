@@ -17,9 +17,7 @@ from .curves import length_around
 
 NO_FREE_DIRECTION = 9.0  # stands for no free direction
 MOST_TOUCHES = 200.0  # times that the disc may touch each sample at the edge, on average
-ROUND_AND_ROUND = (
-    "the boundary cannot be followed: the scan is too rough or too sparse for this length; use another, or clean the scan"
-)
+ROUND_AND_ROUND = "the boundary cannot be followed: the scan is too rough or too sparse for this length; use another, or clean the scan"
 MOST_TRIES = 20  # attempts to roll the disc away from one place
 SHORTEST_OPEN_LOOP = 30.0  # a loop shorter than this that does not close is dropped [disc radii]
 

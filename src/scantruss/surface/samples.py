@@ -180,31 +180,29 @@ def sample_surface(cloud: PointCloud, settings: Settings) -> SurfaceSamples:
     if asked.outlier_distance and not asked.judge_always:
         asked = asked._replace(judge_always=cloud_has_outliers(cloud))
     kept = _SAMPLES_OF_CLOUDS.setdefault(cloud, {})
-    if asked not in kept:
-        most = max(1, POINTS_OF_KEPT_SAMPLES // max(len(cloud.points), 1))
-        for oldest in list(kept)[: max(0, len(kept) + 1 - most)]:
-            del kept[oldest]
-        with_rods = kept.get(asked._replace(keep_rods=True))
-        if not asked.keep_rods and with_rods is not None and _has_no_rods(with_rods, cloud.spacing, asked):
-            kept[asked] = with_rods
-            return with_rods
-        lone = lone_of_cloud(cloud, asked.outlier_distance or UNCLEANED_DISTANCE)
-        given = given_normals(cloud)
-        if given is None and asked.thin_walls:
-            given = normals_of_walls(cloud.points, cloud.spacing, asked.length)
-        made = _prepare(cloud.points, cloud.bounds, cloud.spacing, asked, given, lone=lone)
-        check_is_surface(made)
-        unread = (*cloud.left_out, *((WITHOUT_COORDINATES, cloud.dropped) for _ in range(cloud.dropped > 0)))
-        kept[asked] = replace(
-            made,
-            origin=cloud.origin,
-            unit=cloud.unit,
-            system=cloud.system,
-            unread=unread,
-            cropped=cloud.cropped,
-            lone=lone,
-        )
-    return kept[asked]
+    found = kept.pop(asked, None) or _samples_of(cloud, asked, kept)
+    kept[asked] = found  # the one used last is the last to go
+    return found
+
+
+def _samples_of(cloud: PointCloud, asked: Asked, kept: dict[Asked, SurfaceSamples]) -> SurfaceSamples:
+    """Return the samples that are asked for, by those that are kept, of which the oldest go to make room."""
+    most = max(1, POINTS_OF_KEPT_SAMPLES // max(len(cloud.points), 1))
+    for oldest in list(kept)[: max(0, len(kept) + 1 - most)]:
+        del kept[oldest]
+    with_rods = kept.get(asked._replace(keep_rods=True))
+    if not asked.keep_rods and with_rods is not None and _has_no_rods(with_rods, cloud.spacing, asked):
+        return with_rods
+    lone = lone_of_cloud(cloud, asked.outlier_distance or UNCLEANED_DISTANCE)
+    given = given_normals(cloud)
+    if given is None and asked.thin_walls:
+        given = normals_of_walls(cloud.points, cloud.spacing, asked.length)
+    made = _prepare(cloud.points, cloud.bounds, cloud.spacing, asked, given, lone=lone)
+    check_is_surface(made)
+    unread = (*cloud.left_out, *((WITHOUT_COORDINATES, cloud.dropped) for _ in range(cloud.dropped > 0)))
+    return replace(
+        made, origin=cloud.origin, unit=cloud.unit, system=cloud.system, unread=unread, cropped=cloud.cropped, lone=lone
+    )
 
 
 def _has_no_rods(samples: SurfaceSamples, spacing: float, asked: Asked) -> bool:
