@@ -25,7 +25,7 @@ MISSED_MORE = 0.002  # share of the scan that the grid of a longer search may mi
 LEAST_FARTHER = 0.05  # by how much farther from the grid than before a place of the scan is lost [member lengths]
 # distance from a fault, and from a place that was lost, within which no later turn begins [member lengths]
 SPARED_AT_FAULT, SPARED_AT_LOSS = 3.0, 1.5
-LEAST_OF_WORST = 0.9  # shape quality of the worst triangle that is left at least, in that of before
+LEAST_OF_WORST = 0.8  # shape quality of the worst triangle that is left at least, in that of before
 FAR_PLACES = 0.95  # share of the places of the scan that are nearer to the grid than one that counts as lost
 
 _NOWHERE = np.empty((0, 3))
