@@ -18,12 +18,13 @@ from typed import known
 
 import scantruss as st
 from scantruss import pipeline
-from scantruss.attempts.limit import FAR_FROM_PASSING, AttemptLimit
+from scantruss.attempts.limit import FAR_FROM_PASSING, MOST_RUNS, AttemptLimit
 from scantruss.attempts.table import Attempt
 from scantruss.check.crossings import MOST_CROSSINGS
 from scantruss.cli.main import main
 from scantruss.errors import FrontError
 from scantruss.grid.certificate import Certificate, Fault, LeftOut
+from scantruss.report import ladder
 from scantruss.report.advice import Advice
 from scantruss.report.ladder import HOPELESS_NEARBY, LEAST_TRIED, MOST_TRIED, SURE_PER_SPACING, TRIED_AROUND
 from scantruss.report.length_trial import LengthTrial, settled
@@ -332,6 +333,25 @@ def test_of_lengths_that_lose_about_as_much_the_usual_one_is_suggested(monkeypat
     assert advice.suggest() < advice._usual
 
 
+@pytest.mark.parametrize("at_last", [True, False])
+def test_a_length_that_loses_little_is_suggested_where_the_next_above_passes_at_last(
+    at_last: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As of a range scan in pieces: longer members leave some of them out."""
+
+    def tried(advice: Advice, length: float, most: int = 0) -> LengthTrial:
+        certificate = SimpleNamespace(judged_out=0.002 if length < 1.7 * advice._usual else 0.03)
+        share = length / advice._usual
+        passes = 0.95 < share < 1.1 or share > 1.7 or (at_last and share > 1.1 and most == MOST_RUNS)
+        grid = cast(Any, SimpleNamespace(certificate=certificate)) if passes else None
+        trial = advice._found[length] = LengthTrial(length, grid, None if passes else st.FrontError("it fails"))
+        return trial
+
+    monkeypatch.setattr(Advice, "try_length", tried)
+    advice = Advice(cloud_of("limpet"), st.Settings(length=1.0))
+    assert (advice.suggest() == advice._usual) == at_last
+
+
 def refused_with(crossings: int) -> st.CertificateError:
     """Return the refusal of a grid with so many triangles that cut each other, and two boundaries of three."""
     found = Certificate(
@@ -512,7 +532,7 @@ def test_the_next_longer_length_is_tried_before_that_of_a_thin_wall_takes_all_gr
     cloud = cloud_of("limpet")
     usual = Advice(cloud, st.Settings(length=1.0))._usual
     wall = 0.5 * usual
-    monkeypatch.setattr(Advice, "_length_of_wall", lambda _: wall)
+    monkeypatch.setattr(ladder, "length_of_wall", lambda *_: wall)
     monkeypatch.setattr(Advice, "_cost", lambda _, length: 1e5 if length < 0.6 * usual else 5e4)
     counted_runs(monkeypatch, lambda length: 1.3 * wall < length < 1.5 * wall)
     advice = Advice(cloud, st.Settings(length=1.0))

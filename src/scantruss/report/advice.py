@@ -13,13 +13,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..attempts.limit import AttemptLimit, cuts_everywhere, loses_limbs
+from ..attempts.limit import MOST_RUNS, AttemptLimit, cuts_everywhere, loses_limbs
 from ..attempts.table import attempts
 from ..errors import FrontError, InputError, LengthError, LinesError, OneSidedError, ScanTrussError
 from ..pipeline import first_that_passes
 from ..scan.member_length import exact_range, length_range, round_length, suggest_length
 from ..surface.samples import sample_surface
-from ..surface.shape import wall_of_surface
 from ..surface.size_field import measured_bends
 from . import ladder
 from .length_trial import LengthTrial, settled
@@ -194,7 +193,7 @@ class Advice:
         if both:
             least = min(both.values())
             most_lost = max(least + ladder.LOST_ALIKE, ladder.LOST_ALIKE_SHARE * least)
-            return next(length for length, lost in both.items() if lost <= most_lost)
+            return self._losing_less(next(length for length, lost in both.items() if lost <= most_lost))
         if not self.passes:
             self._try_longer()
         if not self.passes:
@@ -214,6 +213,16 @@ class Advice:
         keeps_limbs = self._too_long == math.inf  # else shorter members may
         enough = keeps_limbs and len(self._begun) >= ladder.HOPELESS_LENGTHS
         return enough and all(limit.all_hopeless for _, _, limit in self._begun.values())
+
+    def _losing_less(self, length: float) -> float:
+        """Return the next length below one, at which much is lost, that passes and loses little, if that above it passes at last."""
+        shorter = [trial for trial in self.tried if trial.passed and trial.length < length]
+        if not shorter or shorter[-1].lost > ladder.MOST_LOST:
+            return length
+        above = self.next_above(shorter[-1].length)
+        self._count_at(above, MOST_RUNS)
+        trial = self.try_length(above, MOST_RUNS)
+        return shorter[-1].length if trial is not None and trial.passed else length
 
     def _following_more(self, trial: LengthTrial) -> float:
         """Return the length of a trial that passes, or the next below it if that follows what this one does not, and loses no more.
@@ -260,7 +269,7 @@ class Advice:
         That of a thin wall costs most; the next longer one, at which both sides are still apart, is looked at before it takes all of them.
         """
         yield 1.0, ladder.A_FEW
-        if (wall := self._length_of_wall()) is not None:
+        if (wall := ladder.length_of_wall(self._cloud, self._settings, self._usual)) is not None:
             yield wall / self._usual, ladder.A_FEW
             if not cuts_everywhere(getattr(self._found.get(self._as_tried(wall)), "fault", None)):
                 yield ladder.NEXT_LENGTH * wall / self._usual, ladder.FIRST_TWO
@@ -269,14 +278,6 @@ class Advice:
         first, *others = ladder.SHORTER_FIRST if leaves_out else ladder.LONGER_FIRST
         steps = [first, *([] if wall is None else [(wall / self._usual, ladder.SOME_MORE)]), *others]
         yield from sorted(steps, key=lambda step: step[1]) if self._loses_limbs() else steps
-
-    def _length_of_wall(self) -> float | None:
-        """Return the length that keeps both sides of a thin wall apart, as of a bowl; None where there is none, or too few points."""
-        half = max(0.5 * self._usual, length_range(self._cloud)[0])
-        samples = sample_surface(self._cloud, self._settings.replace(length=half))
-        thickness, share = wall_of_surface(samples, self._usual)
-        length = ladder.LENGTH_OF_WALL * thickness
-        return length if share >= ladder.MOSTLY_WALL and length >= ladder.LEAST_OF_WALL * self._cloud.spacing else None
 
     def _tried_usual(self) -> LengthTrial | None:
         """Return what came of the usual length, or of that tried which is nearest to it."""

@@ -2,6 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
+from ..scan.member_length import length_range
+from ..surface.samples import sample_surface
+from ..surface.shape import wall_of_surface
+
+if TYPE_CHECKING:
+    from ..scan.cloud import PointCloud
+    from ..settings import Settings
+
 # grids that are made of a length before others are tried: where many are to be tried, usually, and when it is tried again
 FIRST_TWO, A_FEW, SOME_MORE = 2, 4, 8
 #: lengths to try in turn after the usual one, as multiples of it, with how many grids are made of each
@@ -45,3 +55,14 @@ HOPELESS_NEARBY = 4
 HOPELESS_LENGTHS = 3
 # lengths that are tried beside the usual one where none of these passes, as multiples of it
 BESIDE_USUAL = (1.12, 0.9, 1.25)
+
+
+def length_of_wall(cloud: PointCloud, settings: Settings, usual: float) -> float | None:
+    """Return the length that keeps both sides of a thin wall apart, as of a bowl; None where there is none, or too few points.
+
+    usual : length below which a wall is thin
+    """
+    samples = sample_surface(cloud, settings.replace(length=max(0.5 * usual, length_range(cloud)[0])))
+    thickness, share = wall_of_surface(samples, usual)
+    length = LENGTH_OF_WALL * thickness
+    return length if share >= MOSTLY_WALL and length >= LEAST_OF_WALL * cloud.spacing else None
