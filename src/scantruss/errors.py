@@ -79,7 +79,8 @@ def words_of_place(where: Iterable[float]) -> str:
 def words_of_number(value: float, digits: int) -> str:
     """Return a number with so many digits for a reader: 1,440, where a format alone would say 1.44e+03."""
     short = f"{value:.{digits}g}"
-    if not 1000.0 <= abs(rounded := float(short)) < MOST_WRITTEN_OUT:
+    rounded = float(short)
+    if abs(rounded) >= MOST_WRITTEN_OUT or (abs(rounded) < 1000.0 and "e+" not in short):
         return short
     return f"{rounded:,.0f}" if rounded.is_integer() else f"{rounded:,}"
 

@@ -134,7 +134,7 @@ def note_outliers(
     pieces, share = samples.left_out
     if pieces and listed is None:
         bars.note(
-            f"{pieces:,} {'piece' if pieces == 1 else 'pieces'}, {100 * share:.2g} % of the scanned surface, left out:"
+            f"{pieces:,} {'piece' if pieces == 1 else 'pieces'}, {words_of_number(100 * share, 2)} % of the scanned surface, left out:"
             " too small for this length or compared with the others"
         )
 
@@ -147,7 +147,8 @@ def note_layers(bars: Bars, cloud: PointCloud, settings: Settings) -> None:
     if share > 0.0 and not settings.thin_walls:
         unit = f" {cloud.unit}" if cloud.unit else ""
         bars.note(
-            f"the scan has two layers about {distance:.2g}{unit} apart on {share:.0%} of its surface, such as top and underside;"
+            f"the scan has two layers about {words_of_number(distance, 2)}{unit} apart on {share:.0%} of its surface,"
+            " such as top and underside;"
             " the grid is one sheet between or on them: crop one layer away for a grid of the other, or try --thin-walls for both"
         )
 

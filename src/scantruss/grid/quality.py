@@ -46,7 +46,7 @@ class GridQuality:
             return (
                 f"{shape}, length {self.stretch_mean:.3f} +- {self.stretch_mean * self.stretch_cv:.3f} of the desired"
             )
-        return f"{shape}, length {words_of_number(self.length_mean, 4)} +- {self.length_std:.2g} {self.unit}".rstrip()
+        return f"{shape}, length {words_of_number(self.length_mean, 4)} +- {words_of_number(self.length_std, 2)} {self.unit}".rstrip()
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values, ready for JSON."""

@@ -208,7 +208,7 @@ def offset_words(certificate: Certificate) -> str:
     unit, member = f" {certificate.unit}" if certificate.unit else "", 2.0 * certificate.reach
     bias, most, scatter = certificate.node_bias, certificate.node_bias_p95, certificate.node_scatter
     return (
-        f"bias {bias:+.2g}, 95 % within {most:.2g}, scatter {scatter:.2g}{unit}"
+        f"bias {bias:+.2g}, 95 % within {words_of_number(most, 2)}, scatter {words_of_number(scatter, 2)}{unit}"
         f" ({bias / member:+.2g}, {most / member:.2g}, {scatter / member:.2g} members)"
     )
 

@@ -32,7 +32,7 @@ def advice_rows(advice: Advice, length: float, cloud: PointCloud) -> tuple[tuple
             (
                 f"{each:g}",
                 f"{members:,}",
-                f"{each**2 / (8.0 * radius):.2g}" if each <= 2.0 * radius else "-",
+                words_of_number(each**2 / (8.0 * radius), 2) if each <= 2.0 * radius else "-",
                 f"{each / cloud.spacing:.3g}",
                 result_of(trial),
             )
@@ -95,7 +95,9 @@ def advice_lines(advice: Advice, length: float, cloud: PointCloud) -> list[str]:
     lines = [bent]
     if trial is not None and trial.grid is not None and trial.grid.certificate is not None:
         noise = trial.grid.certificate.noise
-        lines.append(f"noise {noise:.2g}{unit}, {noise / cloud.spacing:.2g} spacings, {noise / length:.2g} members")
+        lines.append(
+            f"noise {words_of_number(noise, 2)}{unit}, {noise / cloud.spacing:.2g} spacings, {noise / length:.2g} members"
+        )
     lines += passing_lines(advice.tried, unit)
     if trial is not None and not trial.passed:
         where = trial.fault.where if trial.fault is not None else None

@@ -148,7 +148,7 @@ def caption_of(grid: Grid) -> str:
     quality = grid.quality
     return (
         f"{len(grid.nodes)} nodes   {len(grid.edges)} members   {len(grid.panel_table)} {grid.panels_are}      "
-        f"member length {words_of_number(quality.length_mean, 4)} ± {quality.length_std:.2g} {grid.unit}".rstrip()
+        f"member length {words_of_number(quality.length_mean, 4)} ± {words_of_number(quality.length_std, 2)} {grid.unit}".rstrip()
         + f"      shape quality {quality.shape_mean:.3f} ± {quality.shape_std:.3f}"
     )
 
