@@ -105,24 +105,30 @@ def test_nearer_counts_against_poorer_and_unevener() -> None:
     assert not follows_better(grid.replace(certificate=None), far)
 
 
-def test_the_wide_folds_beside_which_a_grid_fails_are_given_up_alone(
-    cloud: PointCloud, monkeypatch: pytest.MonkeyPatch
+@pytest.mark.parametrize("fails", [True, False])
+def test_the_wide_folds_beside_which_a_grid_fails_or_is_poor_are_given_up_alone(
+    fails: bool, cloud: PointCloud, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     settings = Settings(length=SIZE)
     attempt = Attempt(settings)
     folds = wide_folds(find_boundary(sample_surface(cloud, settings), settings)[0], settings)
-    bad = folds[0][len(folds[0]) // 2] + cloud.origin
+    bad = tuple((folds[0][len(folds[0]) // 2] + cloud.origin).tolist())
     made: list[tuple[int, ...]] = []
-    made_grid = cast(Grid, SimpleNamespace())
+
+    def grid_with(*warnings: Fault) -> Grid:
+        return cast(Grid, SimpleNamespace(certificate=SimpleNamespace(warnings=warnings)))
+
+    good, poor = grid_with(), grid_with(Fault("angle", "has an angle of 20 degrees", bad))
 
     def make(_: PointCloud, tried: Attempt, **__: object) -> Grid:
         made.append(tried.wide)
-        if 0 in tried.wide:
-            raise FrontError("it fails", None, tuple(bad.tolist()))
-        return made_grid
+        if 0 in tried.wide and fails:
+            raise FrontError("it fails", None, bad)
+        return poor if 0 in tried.wide else good
 
     monkeypatch.setattr("scantruss.pipeline.make_grid", make)
     every = tuple(range(len(folds)))
-    grid, wide = with_wide_ridges(cloud, replace(attempt, wide=every), None)
-    assert grid is made_grid and made == [every, wide] and 0 not in wide and len(wide) >= len(every) - 3
-    assert with_wide_ridges(cloud, replace(attempt, wide=(0,)), None) == (None, ())
+    grid, wide = with_wide_ridges(cloud, replace(attempt, wide=every), lambda grid: grid is good, None)
+    assert grid is good and made == [every, wide] and 0 not in wide and len(wide) >= len(every) - 3
+    assert with_wide_ridges(cloud, replace(attempt, wide=(0,)), lambda grid: grid is good, None) == (None, ())
+    assert with_wide_ridges(cloud, replace(attempt, wide=wide), lambda _: False, None) == (None, ())

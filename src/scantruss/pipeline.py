@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
@@ -13,8 +13,8 @@ import numpy as np
 
 from .attempts.course import AttemptCourse
 from .attempts.limit import AttemptLimit
-from .attempts.looks import follows_better, follows_ridges_as_well
-from .attempts.table import AS_ASKED, Attempt
+from .attempts.looks import follows_better, follows_ridges_as_well, poor_places
+from .attempts.table import AS_ASKED, Attempt, places_of
 from .boundary.find import find_boundary
 from .candidates import advance_fronts, best_that_passes, improve_fronts
 from .cells.make import settings_of_triangles, with_cells
@@ -182,24 +182,32 @@ def make_grid_with_wide_ridges(cloud: PointCloud, attempt: Attempt, *, progress:
     every = tuple(sorted({*made, *crests_cut_off(plain, crests, settings.length)}))
     tried = {every: follows_better, made: follows_ridges_as_well}  # the second alone where both are the same
     for wide, is_taken in tried.items():
-        folded, wide_taken = with_wide_ridges(cloud, replace(first, wide=wide), seen) if wide else (None, ())
-        if folded is not None and is_taken(folded, plain):
+        asked = replace(first, wide=wide)
+        folded, wide_taken = (
+            with_wide_ridges(cloud, asked, partial(is_taken, other=plain), seen) if wide else (None, ())
+        )
+        if folded is not None:
             with suppress(FrontError):
                 return make_grid(cloud, replace(attempt, wide=wide_taken), progress=progress) if is_long else folded
     return make_grid(cloud, attempt, progress=progress) if is_long else plain
 
 
 def with_wide_ridges(
-    cloud: PointCloud, attempt: Attempt, progress: Progress | None
+    cloud: PointCloud, attempt: Attempt, is_taken: Callable[[Grid], bool], progress: Progress | None
 ) -> tuple[Grid | None, tuple[int, ...]]:
-    """Return the grid with ridges along wide folds, and which; where it fails beside some, without those; None where that fails too."""
-    try:
-        return make_grid(cloud, attempt, progress=progress), attempt.wide
-    except FrontError as fault:
-        later = attempt.without_wide(fault, cloud)
-    if later is not None:
-        with suppress(FrontError):
-            return make_grid(cloud, later, progress=progress), later.wide
+    """Return the grid with ridges along wide folds if it is taken, and which folds; else once without those beside which it is poor."""
+    tried: Attempt | None = attempt
+    for _ in range(2):
+        if tried is None:
+            break
+        try:
+            grid = make_grid(cloud, tried, progress=progress)
+            if is_taken(grid):
+                return grid, tried.wide
+            places = poor_places(grid)
+        except FrontError as fault:
+            places = places_of(fault)
+        tried = tried.without_wide(places, cloud)
     return None, ()
 
 

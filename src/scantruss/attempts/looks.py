@@ -275,6 +275,12 @@ def follows_ridges_as_well(grid: Grid, other: Grid) -> bool:
     return is_even and is_near and _poor_members(found) <= _poor_members(known)
 
 
+def poor_places(grid: Grid) -> list[Place]:
+    """Return the places of poor members and triangles of a grid with its certificate [scan unit]."""
+    warnings = grid.certificate.warnings if grid.certificate is not None else ()
+    return [place for each in warnings if each.kind in POOR_MEMBERS for place in (each.where, *each.also) if place]
+
+
 def _poor_members(certificate: Certificate) -> int:
     """Return of how many kinds the warnings are that say of members or triangles that they are poor."""
     return len({warning.kind for warning in certificate.warnings} & POOR_MEMBERS)

@@ -65,18 +65,20 @@ class Attempt:
         follows = self.settings.ridge_angle > 0.0 and self.settings.method == "default" and self.starts is None
         if not follows or len(self.faults) >= FAULTS_WITHOUT_RIDGES or not (followed := self.ridge_points(cloud)):
             return None
-        new = tuple(dict.fromkeys(place for place in _places_of(fault) if place not in self.faults))
+        new = tuple(dict.fromkeys(place for place in places_of(fault) if place not in self.faults))
         later = replace(self, faults=self.faults + new)
         return later if new and later.ridge_points(cloud) < followed else None
 
-    def without_wide(self, fault: FrontError, cloud: PointCloud) -> Attempt | None:
-        """The same attempt without the wide folds beside which it failed; None where that is none, or all."""
+    def without_wide(self, faults: Sequence[tuple[float, float, float]], cloud: PointCloud) -> Attempt | None:
+        """The same attempt without the wide fold beside each of some places [scan unit]; None where that is none, or all."""
         samples, settings = self._samples(cloud)
-        folds, places = wide_folds(samples, settings), np.reshape(_places_of(fault), (-1, 1, 3)) - samples.origin
-        near = [
-            bool((((places - fold) ** 2).sum(axis=2) < (FAULT_REACH * settings.length) ** 2).any()) for fold in folds
-        ]
-        kept = tuple(number for number in self.wide if not near[number])
+        own, places = list(self.wide), np.reshape(faults, (-1, 1, 3)) - samples.origin
+        folds = wide_folds(samples, settings)
+        away = np.array(
+            [np.linalg.norm(places - folds[number], axis=2).min(axis=1) for number in own]
+        )  # (folds, places)
+        beside = {own[fold] for fold in away.argmin(axis=0)[away.min(axis=0) < FAULT_REACH * settings.length]}
+        kept = tuple(number for number in own if number not in beside)
         return replace(self, wide=kept) if kept and kept != self.wide else None
 
     def ridge_points(self, cloud: PointCloud) -> int:
@@ -114,7 +116,7 @@ class Attempt:
         return ""
 
 
-def _places_of(fault: FrontError) -> list[tuple[float, float, float]]:
+def places_of(fault: FrontError) -> list[tuple[float, float, float]]:
     """Return the places at which a grid fails [scan unit]."""
     whole = fault.whole if isinstance(fault, CertificateError) else fault
     found = whole.grid.certificate if whole.grid is not None else None
