@@ -13,8 +13,8 @@ import numpy as np
 
 from .attempts.course import AttemptCourse
 from .attempts.limit import AttemptLimit
-from .attempts.looks import follows_better, follows_ridges_as_well, poor_places
-from .attempts.table import AS_ASKED, Attempt, places_of
+from .attempts.looks import follows_better, follows_ridges_as_well, places_of_poor_members
+from .attempts.table import AS_ASKED, Attempt, places_of_fault
 from .boundary.find import find_boundary
 from .candidates import advance_fronts, best_that_passes, improve_fronts
 from .cells.make import settings_of_triangles, with_cells
@@ -204,9 +204,9 @@ def with_wide_ridges(
             grid = make_grid(cloud, tried, progress=progress)
             if is_taken(grid):
                 return grid, tried.wide
-            places = poor_places(grid)
+            places = places_of_poor_members(grid)
         except FrontError as fault:
-            places = places_of(fault)
+            places = places_of_fault(fault)
         tried = tried.without_wide(places, cloud)
     return None, ()
 

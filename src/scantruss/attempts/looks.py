@@ -275,7 +275,7 @@ def follows_ridges_as_well(grid: Grid, other: Grid) -> bool:
     return is_even and is_near and _poor_members(found) <= _poor_members(known)
 
 
-def poor_places(grid: Grid) -> list[Place]:
+def places_of_poor_members(grid: Grid) -> list[Place]:
     """Return the places of poor members and triangles of a grid with its certificate [scan unit]."""
     warnings = grid.certificate.warnings if grid.certificate is not None else ()
     return [place for each in warnings if each.kind in POOR_MEMBERS for place in (each.where, *each.also) if place]

@@ -65,7 +65,7 @@ class Attempt:
         follows = self.settings.ridge_angle > 0.0 and self.settings.method == "default" and self.starts is None
         if not follows or len(self.faults) >= FAULTS_WITHOUT_RIDGES or not (followed := self.ridge_points(cloud)):
             return None
-        new = tuple(dict.fromkeys(place for place in places_of(fault) if place not in self.faults))
+        new = tuple(dict.fromkeys(place for place in places_of_fault(fault) if place not in self.faults))
         later = replace(self, faults=self.faults + new)
         return later if new and later.ridge_points(cloud) < followed else None
 
@@ -116,7 +116,7 @@ class Attempt:
         return ""
 
 
-def places_of(fault: FrontError) -> list[tuple[float, float, float]]:
+def places_of_fault(fault: FrontError) -> list[tuple[float, float, float]]:
     """Return the places at which a grid fails [scan unit]."""
     whole = fault.whole if isinstance(fault, CertificateError) else fault
     found = whole.grid.certificate if whole.grid is not None else None
