@@ -7,13 +7,15 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
+from small_grids import dome
 
-from scantruss import Certificate, Grid
+from scantruss import Certificate, Grid, Settings
 from scantruss.check.limits import places_to_look_at
 from scantruss.errors import words_of_number
 from scantruss.grid.certificate import LeftOut, Spread, Worst
 from scantruss.kernels.geometry.components import component_labels
-from scantruss.report.figures import distance_lines, left_out_lines
+from scantruss.report.figures import distance_lines, left_out_lines, line_lines
+from scantruss.report.terminal import print_table
 
 
 @pytest.mark.kernels
@@ -93,3 +95,22 @@ def test_the_farthest_point_is_said_to_be_left_out_where_it_is(largest: float, l
         "; 15.00% of them are listed as left out, the farthest among them: in a floor under the others (near 1, 2, 3)"
     )
     assert line.endswith(said) == listed
+
+
+@pytest.mark.parametrize(
+    ("sharpest", "words"), [(103.0, "no ridge is followed"), (150.0, "no ridge: no sharp edge is")]
+)
+def test_no_ridge_is_only_said_to_be_there_where_no_fold_is_sharp(sharpest: float, words: str) -> None:
+    found = Certificate("m", 0.5, True, True, 1, 1, 1, 1, 1, 0, sharpest_fold=Worst(sharpest, (0.0, 0.0, 0.0)))
+    grid = dataclasses.replace(dome(), certificate=found, settings=Settings(length=4.0, ridge_angle=40.0))
+    (line,) = line_lines(grid)
+    assert line.startswith(words)
+
+
+def test_in_a_table_words_start_and_figures_end_below_each_other(capsys: pytest.CaptureFixture[str]) -> None:
+    print_table(("length", "members", "a quick run"), [("2.3", "22,410", "not tried"), ("13", "86", "passes")])
+    assert capsys.readouterr().out.splitlines() == [
+        "length  members  a quick run",
+        "2.3      22,410  not tried",
+        "13           86  passes",
+    ]

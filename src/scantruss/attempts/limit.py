@@ -21,8 +21,8 @@ MOST_FAR, MOST_GIVEN_UP = 2, 3  # attempts in a row of the same settings that ar
 MOST_FAR_OF_BODY = 1
 # by how much more than may be missing is cut off where no front leaves out less: some follows the ends of a limb a little farther
 LIMBS_BY_FRONT = 1.1
-# settings by which limbs are cut off, and what may be left of them, beside how far the samples are apart
 FAULTS_OF_FRONTS = {"manifold", "orientable", "pieces", "loops"}  # kinds of faults that no search changes
+# settings by which limbs are cut off, and what may be left of them, beside how far the samples are apart
 CUTS_BY = ("limb_girth", "keep_rods", "judge_outliers", "smooth_scale", "thin_walls", "sharp_edges", "plain_body")
 
 

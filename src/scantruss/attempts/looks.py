@@ -80,9 +80,8 @@ class AskedScan:
         if not self.by_default or self.asked.thin_walls or self.cloud.normals is not None:
             return False
         samples = sample_surface(self.cloud, self.asked.replace(thin_walls=True))
-        if (
-            self.rough >= ROUGH_SCAN and samples.rough > ROUGH_AS_WALLS * self.rough
-        ):  # it is noise that makes it look rough
+        looks_rough_by_noise = self.rough >= ROUGH_SCAN and samples.rough > ROUGH_AS_WALLS * self.rough
+        if looks_rough_by_noise:
             return False
         return wall_of_surface(samples, THIN_WALL * self.asked.length)[1] > SOME_WALLS
 

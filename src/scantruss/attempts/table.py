@@ -74,9 +74,8 @@ class Attempt:
         samples, settings = self._samples(cloud)
         own, places = list(self.wide), np.reshape(faults, (-1, 1, 3)) - samples.origin
         folds = wide_folds(samples, settings)
-        away = np.array(
-            [np.linalg.norm(places - folds[number], axis=2).min(axis=1) for number in own]
-        )  # (folds, places)
+        # distance of each fold from each place
+        away = np.array([np.linalg.norm(places - folds[number], axis=2).min(axis=1) for number in own])
         beside = {own[fold] for fold in away.argmin(axis=0)[away.min(axis=0) < FAULT_REACH * settings.length]}
         kept = tuple(number for number in own if number not in beside)
         return replace(self, wide=kept) if kept and kept != self.wide else None

@@ -69,7 +69,9 @@ def frayed(crushed: list[Fault], found: Distances, followed: np.ndarray, members
     if missed < FRAYED_MISSES or not any(len(each.also) + 1 >= FRAYED_FROM for each in crushed):
         return []
     worst = crushed[0]
-    words = f"is frayed at {len(worst.also) + 1} places, where it comes to a point and misses {missed:.1%} of the scan"
+    places = len(worst.also) + 1
+    more = " or more" if places == PLACES_KEPT else ""
+    words = f"is frayed at {places} places{more}, where it comes to a point and misses {missed:.1%} of the scan"
     return [Fault("frayed", words, worst.where, worst.also)]
 
 

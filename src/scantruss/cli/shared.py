@@ -148,8 +148,8 @@ def note_layers(bars: Bars, cloud: PointCloud, settings: Settings) -> None:
         unit = f" {cloud.unit}" if cloud.unit else ""
         bars.note(
             f"the scan has two layers about {words_of_number(distance, 2)}{unit} apart on {share:.0%} of its surface,"
-            " such as top and underside;"
-            " the grid is one sheet between or on them: crop one layer away for a grid of the other, or try --thin-walls for both"
+            " such as top and underside; the grid is one sheet between or on them: crop one layer away for a grid of the other,"
+            " or try --thin-walls for both"
         )
 
 
