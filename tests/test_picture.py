@@ -260,6 +260,50 @@ def test_a_body_without_a_flat_face_stands_along_y_or_z_never_along_x(extent: An
     assert int(np.abs(likely_upward(nodes, np.zeros(3))).argmax()) == axis
 
 
+def turned_profile(radii: Any, heights: Any) -> np.ndarray:
+    """Return points of a surface of revolution about z through rings of some radii at some heights, with flat ends between."""
+    turn = np.linspace(0, 2 * np.pi, 36, endpoint=False)
+    return np.concatenate(
+        [
+            np.column_stack([r * np.cos(turn), r * np.sin(turn), np.full(36, z)])
+            for r, z in zip(radii, heights, strict=True)
+        ]
+    )
+
+
+def on_four_legs() -> np.ndarray:
+    """Return points of an animal with a long neck, four thin legs and flat flanks."""
+    body = np.array([[x, y, z] for x in np.linspace(0, 6, 13) for y in (-1, 1) for z in np.linspace(6, 9, 7)])
+    neck = np.array([[6 + z / 3, y, 9 + z] for z in np.linspace(0, 8, 9) for y in (-0.9, 0.9)])
+    legs = np.array([[x, y, z] for x in (0.5, 5.5) for y in (-0.8, 0.8) for z in np.linspace(0, 6, 9)])
+    return np.concatenate([body, neck, legs])
+
+
+@pytest.mark.parametrize(
+    ("nodes", "openness"),
+    [
+        (turned_profile(np.linspace(1.5, 1.2, 30), np.linspace(0, 12, 30)), 0.03),  # a column
+        (turned_profile(np.sqrt(np.linspace(0, 1, 20)) * 3, np.linspace(0, 2.5, 20)), 0.43),  # a bowl with no foot
+        (turned_profile([4, 4, 4.5, 3, 1.2, 1.2], [0, 8, 12, 15, 17, 20]), 0.0),  # a bottle
+        (on_four_legs(), 0.0),
+    ],
+    ids=["column", "bowl", "bottle", "animal"],
+)
+@pytest.mark.parametrize("axis", [1, 2])
+def test_what_has_unlike_ends_stands_on_one_of_them_with_y_or_z_up(nodes: Any, openness: float, axis: int) -> None:
+    """Columns and animals lay on their sides, a bowl upside down."""
+    facing = np.array([0.0, 0.0, -openness])
+    turned, facing = np.roll(nodes, axis - 2, axis=1), np.roll(facing, axis - 2)
+    assert np.array_equal(likely_upward(turned, facing), np.eye(3)[axis])
+
+
+def test_a_long_tube_lies_and_a_vase_with_ends_alike_stands() -> None:
+    tube = turned_profile(np.ones(100), np.linspace(0, 60, 100))[:, [0, 2, 1]]
+    assert np.array_equal(likely_upward(tube, np.zeros(3)), [0, 0, 1])
+    vase = turned_profile(4 + np.sin(np.linspace(0, np.pi, 40)), np.linspace(0, 14, 40))[:, [0, 2, 1]]
+    assert np.array_equal(likely_upward(vase, np.zeros(3)), [0, 1, 0])
+
+
 def test_gravity_is_z_where_the_unit_or_the_file_tells() -> None:
     grid = dome()
     assert known_upward(grid, None) is None and known_upward(grid, cloud_over(grid)) is None

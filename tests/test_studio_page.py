@@ -492,7 +492,7 @@ def test_what_goes_is_shown_within_the_scan(served: tuple[str, Session, Any]) ->
     address, session, _ = served
     with open_page(address) as (page, errors):
         page.wait_for_selector("text=Generate")
-        assert until(lambda: session.grid is not None)
+        assert until(lambda: session.grid is not None) and session.worker.wait(PATIENCE)
         tab(page, "Grid")
         for name in ("draw members", "draw panels"):
             field(page, name).uncheck()

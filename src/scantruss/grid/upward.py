@@ -23,7 +23,7 @@ LEVEL_FACING = 0.5
 LEAST_RISE = 0.12  # depth of a shell along the axis that it faces above which that axis is up [longest side]
 FACE_DEPTH = 0.02  # how flat the face is on which something stands [longest side]
 FLAT_FACE = 0.1  # least share of such a face in the plan
-LOWER_FACE_WEIGHT = 3.0  # how much more a face counts that is below in a file with y or z up
+Z_WEIGHT = {1: 1.0, 2: 3.0}  # how much flat faces at both ends of an axis count: most scans have z up
 TALLER = 1.15  # how much longer the side of a body is along which it stands
 # thickness up to which a body lies flat, and one that is long in x, as an animal on its legs is [middle side]
 FLAT_BODY, FLAT_LONG_BODY = 0.5, 0.25
@@ -67,29 +67,31 @@ def facing_of(nodes: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 
 def likely_upward(nodes: np.ndarray, facing: np.ndarray) -> np.ndarray:
-    """Return the direction that is probably up (3,), where gravity is not known: an object lies on its largest flat face.
+    """Return the direction that is probably up (3,), where gravity is not known: y or z, along which the ends of an object differ most.
 
-    An open shell lies across the way it faces, with y or z of its file upwards: a net between masts and a bowl face down. But one that
-    faces a side stands, as a facade, unless it faces along an axis and rises as a dome does. An object
-    without a flat face stands along its longest side, or lies if it is flat.
+    It stands on a flat face, a foot or four legs, or has a lip above, and its two sides are much alike; where the ends differ nowhere, it
+    stands on the larger ones. An open shell lies across the way it faces, with y or z of its file upwards: a net between masts and a bowl
+    face down. But one that faces a side stands, as a facade, unless it faces along an axis and rises as a dome does. An object
+    without flat faces stands along its longest side, or lies if it is flat.
     """
     openness = float(np.linalg.norm(facing))
     if openness > OPEN_SHELL:
         return AGAINST_GRAVITY.copy() if _is_facade(nodes, facing / openness) else _upward(facing / openness)
-    extent = np.ptp(nodes, axis=0)
-    faces = {}
-    for axis in range(3):
-        across = np.delete(nodes, axis, axis=1)
-        whole = float(np.prod(np.ptp(across, axis=0))) or 1.0
-        for sign in (1.0, -1.0):
-            height = sign * nodes[:, axis]
-            down = height <= height.min() + FACE_DEPTH * extent.max()
-            usual = LOWER_FACE_WEIGHT if sign > 0.0 and axis in (1, 2) else 1.0  # most files have y or z up
-            faces[axis, sign] = (usual * _area_around(across[down]), _area_around(across[down]) / whole)
-    (axis, sign), (_, share) = max(faces.items(), key=lambda item: item[1][0])
-    if share > FLAT_FACE:
-        return sign * np.eye(3)[axis]
-    return _upward(facing / openness) if openness > LEAST_FACING else _standing(extent)
+    shares = {axis: _end_shares(nodes, axis) for axis in (1, 2)}
+    axis = max(shares, key=lambda each: np.ptp(shares[each]))
+    if np.ptp(shares[axis]) <= FLAT_FACE:
+        axis = max(shares, key=lambda each: Z_WEIGHT[each] * shares[each].min())
+    if shares[axis].max() > FLAT_FACE:
+        return np.eye(3)[axis]
+    return _upward(facing / openness) if openness > LEAST_FACING else _standing(np.ptp(nodes, axis=0))
+
+
+def _end_shares(nodes: np.ndarray, axis: int) -> np.ndarray:
+    """Return the share in the plan of the flat faces at both ends of an axis (2,)."""
+    across, height = np.delete(nodes, axis, axis=1), nodes[:, axis]
+    depth = FACE_DEPTH * float(np.ptp(nodes, axis=0).max())
+    ends = (height <= height.min() + depth, height >= height.max() - depth)
+    return np.array([_area_around(across[end]) for end in ends]) / (float(np.prod(np.ptp(across, axis=0))) or 1.0)
 
 
 def _is_facade(nodes: np.ndarray, facing: np.ndarray) -> bool:
