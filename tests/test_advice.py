@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable
 from dataclasses import replace
@@ -434,6 +435,30 @@ def test_a_length_that_loses_ridges_gives_way_to_the_next_below_that_follows_the
     assert advice.suggest() == advice._usual
     loses_from = 1.1  # then none of both does
     assert advice.suggest() == advice._usual
+
+
+@pytest.mark.parametrize(("gap", "steps"), [(0, 1), (1, 3), (2, 4), (3, 0)])
+def test_a_length_that_loses_ridges_gives_way_to_one_that_follows_them_below_lengths_that_fail(
+    gap: int, steps: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The steps of an amphitheatre are followed by short members, their slope by long ones, nothing by those between.
+
+    The one that is taken passes with the next above it.
+    """
+
+    def tried(advice: Advice, length: float, most: int = 0) -> LengthTrial:
+        down = round(math.log(advice._usual / length) / math.log(1.4))
+        warnings = (SimpleNamespace(kind="lost" if down < 1 else "peak"),)
+        found = SimpleNamespace(judged_out=0.0, left_out=(), warnings=warnings)
+        passes = not 1 <= down <= gap
+        return LengthTrial(length, cast(Any, SimpleNamespace(certificate=found)) if passes else None)
+
+    monkeypatch.setattr(Advice, "try_length", tried)
+    advice = Advice(st.PointCloud.from_array(sheet(16, 16, 0.06)), st.Settings(length=1.0))
+    wanted = advice._usual
+    for _ in range(steps):
+        wanted = advice.next_below(wanted)
+    assert advice.suggest() == wanted
 
 
 def test_info_says_which_lengths_pass_and_why_others_do_not(

@@ -466,3 +466,13 @@ def test_a_body_with_many_edges_is_not_rough() -> None:
     """After half of its edges twelve places in a row at their corners look folded: from there on blunt and short ones were given up."""
     found = sum(length_along(ridge.places) for ridge in ridges_of(pier(), 1.4))
     assert found > 0.6 * EDGES_OF_PIER
+
+
+@pytest.mark.parametrize("seed", [6, 1, 4])
+def test_the_ridge_of_a_sharp_valley_runs_from_edge_to_edge(seed: int) -> None:
+    """Its samples lie on both sides, some of them all three tenths of a member and more off the line: it ended there."""
+    random = np.random.default_rng(seed)
+    x, y = random.uniform(-2, 2, 9000), random.uniform(0, 10, 9000)
+    points = np.column_stack([x, y, 1.5 * np.abs(x)]) + 0.008 * random.normal(size=(9000, 3))
+    (valley,) = ridges_of(points, 1.3)
+    assert length_along(valley.places) > 9.7

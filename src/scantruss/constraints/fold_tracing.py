@@ -70,10 +70,10 @@ MOST_PLACES_OF_FOLD = 20_000  # most places along a fold
 MOST_TRACED = 4.0  # times as many places as ridges can have where they lie side by side
 TANGLED_RIDGES = "the ridges of the scan cannot be followed; use another length, or --ridge-angle 0"
 FOLDS_MEET_WITHIN = 0.3  # a fold this near to another one has come to it [member lengths]
-OFF_SCAN = 0.3  # a place farther from the scan than this has left it [member lengths]
+OFF_SCAN = 0.3  # a place nearer to a sample than this is on the scan [member lengths]
 LOOK_AROUND = 0.12  # radius within which the scan is looked for below a ridge [member lengths]
 SHARE_BELOW = 0.25  # share of that radius by which the scan may lie below a sharp ridge
-FAR_OFF = 0.08  # a place on a ridge farther from all points than this is moved to the nearest [member lengths]
+FAR_OFF = 0.08  # a place farther from all points than this is beside the scan [member lengths]
 POINTS_AT_LIP = 7  # points nearest to the line of a lip whose middle height is its own
 FEWEST_AROUND = 5  # fewest points that show whether a place lies off them
 HALF_NARROW_LIP = 0.3  # half the width of a lip below which one line stands for both of its edges [member lengths]
@@ -94,6 +94,7 @@ class Tracer:
         self.most = [POINTS_OF_A_FIT * of_sample / (np.pi * radius**2) for radius in self.radii]
         self.spacing = samples.spacing
         noise = max(noise_of_points(samples), float(np.median(samples.thickness)))
+        self.far = max(FAR_OFF * settings.length, 4.0 * samples.spacing)
         self.fits = max(FOLD_FITS_WITHIN * settings.length, NOISES_OF_FIT * noise)
         self.buffer = np.empty(MOST_POINTS_OF_FIT, FIT_POINT)
         self.origin = samples.origin
@@ -272,7 +273,7 @@ class Tracer:
             place = at.place + stride * ahead
             x, y, z = place.tolist()
             sample = walk(self.surface, sample, (x, y, z))
-            if np.linalg.norm(self.surface.mean[sample] - place) > OFF_SCAN * self.length:
+            if self._is_off_scan(sample, place):
                 break
             after = self.fold_at(sample, place, ahead)
             if after is None or not self._goes_on(after, place, ahead):
@@ -288,6 +289,11 @@ class Tracer:
                 if len(places) and ((places - at.place) ** 2).sum(axis=1).min() < meets**2:
                     return steps, False
         return steps, False
+
+    def _is_off_scan(self, sample: int, place: np.ndarray) -> bool:
+        """Whether a place has left the scan; in a sharp fold all samples may lie far off though points do not."""
+        away = np.linalg.norm(self.surface.mean[sample] - place)
+        return bool(away > OFF_SCAN * self.length and distance_from_scan(self.surface, place) > self.far)
 
     def _goes_on(self, fold: np.record, place: np.ndarray, ahead: np.ndarray) -> bool:
         """Whether the fold found where a line of folds should go on belongs to it."""
@@ -308,10 +314,9 @@ class Tracer:
             return np.zeros(3)
         squares = (away**2).sum(axis=1)
         nearest = int(squares.argmin())
-        far = max(FAR_OFF * self.length, 4.0 * self.spacing)
-        if squares[nearest] > far**2:  # beside the scan, as a corner may be, or beside this side of it only
+        if squares[nearest] > self.far**2:  # beside the scan, as a corner may be, or beside this side of it only
             beside: np.ndarray = -away[nearest]
-            return beside if distance_from_scan(self.surface, place) > far else np.zeros(3)
+            return beside if distance_from_scan(self.surface, place) > self.far else np.zeros(3)
         heights = away @ ahead
         if lip:
             near = np.argsort(squares - heights**2, kind="stable")[:POINTS_AT_LIP]

@@ -17,7 +17,7 @@ from ..attempts.limit import MOST_RUNS, AttemptLimit, cuts_everywhere, loses_lim
 from ..attempts.table import attempts
 from ..errors import FrontError, InputError, LengthError, LinesError, OneSidedError, ScanTrussError
 from ..pipeline import first_that_passes
-from ..scan.member_length import exact_range, length_range, round_length, suggest_length
+from ..scan.member_length import exact_range, length_range, round_length
 from ..surface.samples import sample_surface
 from ..surface.size_field import measured_bends
 from . import ladder
@@ -54,32 +54,8 @@ class Advice:
         self._spent = 0.0  # grids that were made, each counted by its cost
         self.is_spent = False  #: whether a suggestion was looked for
         self._has_table_grids = True  # whether the grids that the table may cost are not yet made
-        self._usual = self._usual_length()
+        self._usual = ladder.usual_length(cloud, self._settings)
         self._count_at(self._usual, ladder.MOST_TRIED)
-
-    def _usual_length(self) -> float:
-        """Return the length that suits the scan; where the lines of a scanner are too far apart for it, the next that sees a surface.
-
-        Raises
-        ------
-        LinesError
-            The points lie along lines at every length, or along so few that these are none of a scanner.
-        """
-        usual, (_, longest) = suggest_length(self._cloud), length_range(self._cloud)
-        steps = math.ceil(math.log(max(longest / usual, 1.0), ladder.NEXT_LENGTH))
-        refused: LinesError | None = None
-        for step in range(steps + 1):
-            length = usual if step == 0 else min(_two_digits(usual * ladder.NEXT_LENGTH**step), longest)
-            try:
-                sample_surface(self._cloud, self._settings.replace(length=length))
-            except LinesError as error:
-                refused = refused or error
-                if refused.lines < ladder.LINES_OF_A_SCANNER:
-                    break
-            else:
-                return length
-        assert refused is not None
-        raise refused
 
     def _count_at(self, length: float, most: float) -> None:
         """Allow so many grids from now on, or fewer where the scan is large; a shorter length costs more than one that counts once."""
@@ -175,7 +151,7 @@ class Advice:
         low, high = length_range(self._cloud)
         both: dict[float, float] = {}  # length -> what is lost there or at the next above
         for share, most in self._ladder():
-            length = self._as_tried(min(max(_two_digits(share * self._usual), low), high))
+            length = self._as_tried(min(max(ladder.two_digits(share * self._usual), low), high))
             if most > ladder.A_FEW and self._loses_limbs() and self.passes:
                 break  # a shorter length than the usual one keeps them, which more grids seldom do
             if self._is_hopeless():
@@ -225,15 +201,29 @@ class Advice:
         return shorter[-1].length if trial is not None and trial.passed else length
 
     def _following_more(self, trial: LengthTrial) -> float:
-        """Return the length of a trial that passes, or the next below it if that follows what this one does not, and loses no more.
+        """Return the length of a trial that passes, or a shorter one if that follows what this one does not, and loses no more.
 
-        That is openings which this one closes, or ridges which it loses.
+        That is openings which this one closes, or ridges which it loses. Lengths between may not pass, as those too long for
+        steps and too short for the slope along them.
         """
-        below = self.next_below(trial.length)
-        shorter = self.try_length(below, ladder.FIRST_TWO) if trial.follows_less and below < trial.length else None
-        if shorter is None or not shorter.passed or shorter.lost > trial.lost + ladder.LOST_ALIKE:
+        if not trial.follows_less:
             return trial.length
-        return below if shorter.follows_less < trial.follows_less else trial.length
+        self._count_at(trial.length, ladder.FIRST_TWO * ladder.STEPS_TO_FOLLOW)
+        above = trial
+        for _ in range(ladder.STEPS_TO_FOLLOW):
+            below = self.next_below(above.length)
+            shorter = self.try_length(below, ladder.FIRST_TWO) if below < above.length else None
+            if shorter is None or (shorter.passed and not self._follows_more(shorter, trial)):
+                break
+            if shorter.passed and above.passed:
+                return below
+            above = shorter
+        return trial.length
+
+    @staticmethod
+    def _follows_more(shorter: LengthTrial, trial: LengthTrial) -> bool:
+        """Whether one of two trials that pass follows what the other does not, and loses no more."""
+        return shorter.follows_less < trial.follows_less and shorter.lost <= trial.lost + ladder.LOST_ALIKE
 
     def _try_longer(self) -> None:
         """Try longer lengths than the usual one until one passes, with the grids of the table: columns are then seen for what they are.
@@ -245,7 +235,7 @@ class Advice:
         self._count_at(self._usual, ladder.TRIED_AROUND)
         self._has_table_grids = False
         for share in ladder.LAST_LENGTHS:
-            length = min(_two_digits(share * self._usual), length_range(self._cloud)[1])
+            length = min(ladder.two_digits(share * self._usual), length_range(self._cloud)[1])
             trial = self.try_length(length, ladder.TRIED_LONGER)
             if trial is not None and trial.passed:
                 return
@@ -259,7 +249,7 @@ class Advice:
             return
         self._count_at(self._usual, min(left, ladder.FIRST_TWO * len(ladder.BESIDE_USUAL)))
         for share in ladder.BESIDE_USUAL:
-            trial = self.try_length(_two_digits(share * self._usual), ladder.FIRST_TWO)
+            trial = self.try_length(ladder.two_digits(share * self._usual), ladder.FIRST_TWO)
             if trial is not None and trial.passed:
                 return
 
@@ -306,7 +296,9 @@ class Advice:
         if length < ladder.FAR_TOO_SHORT * low:
             return self._usual_if_it_passes()
         at = min(max(length, low), high)
-        lengths = {min(max(_two_digits(share * at), low), high) for share in (1.0, *ladder.NEARBY_LENGTHS)} - {length}
+        lengths = {min(max(ladder.two_digits(share * at), low), high) for share in (1.0, *ladder.NEARBY_LENGTHS)} - {
+            length
+        }
         if (sure := round_length(ladder.SURE_PER_SPACING * self._cloud.spacing, "up")) > length and sure < high:
             lengths.add(sure)
         self._count_at(at, ladder.MOST_TRIED)
@@ -350,11 +342,15 @@ class Advice:
 
     def next_above(self, length: float) -> float:
         """Return the next longer length to look at."""
-        return self._as_tried(min(_two_digits(ladder.NEXT_LENGTH * length), max(length, length_range(self._cloud)[1])))
+        return self._as_tried(
+            min(ladder.two_digits(ladder.NEXT_LENGTH * length), max(length, length_range(self._cloud)[1]))
+        )
 
     def next_below(self, length: float) -> float:
         """Return the next shorter length to look at."""
-        return self._as_tried(max(_two_digits(length / ladder.NEXT_LENGTH), min(length, length_range(self._cloud)[0])))
+        return self._as_tried(
+            max(ladder.two_digits(length / ladder.NEXT_LENGTH), min(length, length_range(self._cloud)[0]))
+        )
 
     def _as_tried(self, length: float) -> float:
         """Return the length that was tried already and is nearly the same, or else the same."""
@@ -393,7 +389,3 @@ class Advice:
                 self._progress(f"try {length:g}", share)
 
         return show
-
-
-def _two_digits(length: float) -> float:
-    return round_length(length, "nearest")

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
-from ..scan.member_length import length_range
+from ..errors import LinesError
+from ..scan.member_length import length_range, round_length, suggest_length
 from ..surface.samples import sample_surface
 from ..surface.shape import wall_of_surface
 
@@ -28,6 +30,7 @@ LAST_LENGTHS = (1.4, 2.0, 2.8)  # lengths that are tried where none has passed, 
 NEARLY_NEXT = 1.45  # ratio of lengths that pass up to which the longer one stands for the next to the shorter
 LINES_OF_A_SCANNER = 5  # fewest lines of points that may be those of a scanner
 NEXT_LENGTH = 1.4  # a length is suggested if that many times it passes too
+STEPS_TO_FOLLOW = 4  # such steps that are gone down from one that closes openings or loses ridges to one that does not
 SAME_LENGTH = 1.08  # ratio of lengths up to which what has come of one stands for the other
 # lengths that are tried in place of one that failed
 NEARBY_LENGTHS = (1.12, 0.9, 1.25, 0.8, 1.4, 0.7, 1.7, 0.6, 2.0, 0.5, 2.8)
@@ -55,6 +58,36 @@ HOPELESS_NEARBY = 4
 HOPELESS_LENGTHS = 3
 # lengths that are tried beside the usual one where none of these passes, as multiples of it
 BESIDE_USUAL = (1.12, 0.9, 1.25)
+
+
+def usual_length(cloud: PointCloud, settings: Settings) -> float:
+    """Return the length that suits a scan; where the lines of a scanner are too far apart for it, the next that sees a surface.
+
+    Raises
+    ------
+    LinesError
+        The points lie along lines at every length, or along so few that these are none of a scanner.
+    """
+    usual, (_, longest) = suggest_length(cloud), length_range(cloud)
+    steps = math.ceil(math.log(max(longest / usual, 1.0), NEXT_LENGTH))
+    refused: LinesError | None = None
+    for step in range(steps + 1):
+        length = usual if step == 0 else min(two_digits(usual * NEXT_LENGTH**step), longest)
+        try:
+            sample_surface(cloud, settings.replace(length=length))
+        except LinesError as error:
+            refused = refused or error
+            if refused.lines < LINES_OF_A_SCANNER:
+                break
+        else:
+            return length
+    assert refused is not None
+    raise refused
+
+
+def two_digits(length: float) -> float:
+    """Return a length rounded to the nearest of two digits."""
+    return round_length(length, "nearest")
 
 
 def length_of_wall(cloud: PointCloud, settings: Settings, usual: float) -> float | None:
