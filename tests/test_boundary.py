@@ -6,11 +6,13 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 from shapes import make
-from small_clouds import ball, cap, ring, sheet, tire, turn_of
+from small_clouds import ball, cap, ring, samples_of, sheet, tire, turn_of
 from steps import boundary_of
 
 import scantruss as st
+from scantruss.boundary.curves import resample
 from scantruss.boundary.find import Loop, characteristic_points
+from scantruss.boundary.offset import close_random_bays
 from scantruss.boundary.touched_points import _onwards as onwards
 
 
@@ -344,3 +346,36 @@ def test_a_disc_that_is_caught_on_its_way_rolls_the_other_way_round(seed: int) -
     boundary, _ = found(shape.points, shape.length)
     assert len(boundary.loops) in ((3,) if seed == 2 else (2, 3)) and boundary.loops[0].external
     assert boundary.loops[0].length > 100 * shape.length
+
+
+@pytest.mark.parametrize(
+    ("name", "density", "closes"),
+    [
+        ("bay", 80.0, True),
+        ("bay", 160.0, False),
+        ("tongue", 80.0, False),
+        ("corner", 80.0, False),
+        ("wide", 20.0, False),
+    ],
+)
+def test_a_bay_is_closed_where_few_points_are_expected_in_it(name: str, density: float, closes: bool) -> None:
+    """A bay of 0.1 members squared in a straight side; no tongue, no re-entrant corner, and none as wide as a member."""
+    dents = {"bay": [[0.25, -3], [0, -2.6], [-0.25, -3]], "tongue": [[0.25, -3], [0, -3.4], [-0.25, -3]]}
+    dents |= {"corner": [[3, 0], [0, 0], [0, -3]], "wide": [[0.6, -3], [0, -2.6], [-0.6, -3]]}
+    last = [[3, -3]] if name != "corner" else []
+    corners = np.array([*last, [3, 3], [-3, 3], [-3, -3], *dents[name][::-1]], float)
+    curve = resample(np.column_stack([corners, np.zeros(len(corners))]), 0.05)
+    surface = samples_of(sheet(8, 8, 0.1)).surface
+    found = close_random_bays(curve, density, 1.0, surface)
+    assert (len(found) < len(curve)) == closes
+    if closes:
+        assert found[np.abs(found[:, 0]) < 1.0, 1].min() < -2.9 and (np.abs(found[:, 1]) > 2.95).sum() > 200
+
+
+def test_a_gap_between_random_points_is_no_corner_of_the_boundary() -> None:
+    """The boundary ran 0.44 members into a sheet, to a corner, where a disc fell through its edge between two points."""
+    random = np.random.default_rng(1)
+    points = np.column_stack([random.uniform(-6, 6, (14_000, 2)), np.zeros(14_000)])
+    gap = points[:, 1] < -5.5 - 1.8 * np.abs(points[:, 0])
+    (loop,) = found(points[~gap])[0].loops
+    assert gap.sum() > 4 and np.abs(np.abs(loop.points[:, :2]).max(axis=1) - 6.0).max() < 0.1 and len(loop.corners) == 4

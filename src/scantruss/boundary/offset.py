@@ -10,7 +10,7 @@ from ..kernels.surface.local_surface import Surface
 from ..scan.vectors import dots
 from ..settings import Settings
 from .corners import CURVE_STEP, find_corners
-from .curves import heights_along, outward, room_across, runs_around, smooth_between
+from .curves import heights_along, outward, resample, room_across, runs_around, smooth_between
 
 SMOOTHING_WINDOW = 0.5  # half width of the window in which the curve is always smoothed [member lengths]
 # half widths of wider windows, used where random sampling explains how far they move the curve [member lengths]
@@ -22,6 +22,13 @@ POINTS_OF_CLOSED_BAY = 4.0
 ROOM_ACROSS = 0.6  # distance to another part of the curve below which the offset is limited [member lengths]
 OFFSET_SHARE = 0.25  # largest offset towards another part of the curve, as a share of the distance to it
 POINTS_OF_EMPTY_BAY = 6.0  # a corner in a bay where no more points than this are expected does not count
+# a bay in a straight boundary is closed if no more points than this are expected in it, and none of its sides goes on into it
+POINTS_OF_RANDOM_BAY = 10.0
+WIDEST_BAY = 0.8  # widest mouth of such a bay [member lengths]
+LEAST_BAY = 0.02  # least area of such a bay [square of the member length]
+LONGEST_BAY, LENGTHENED = 2.0, 1.2  # longest way around it [member lengths], and least [its mouth]
+# lengths of the curve beside it that are its sides [member lengths], and the least cosine of their angles with the mouth
+SIDES_OF_BAY, COSINE_OF_SIDE = (0.2, 0.6), 0.92
 BAY_REACH = 1.5  # a bay is measured under a chord that starts and ends this far from its middle [member lengths]
 BAY_COSINE = 0.7  # least cosine between the direction into a bay and the surface
 # mean distance of the surface edge beyond the outermost random points, in the unit of `sampling_bias_of`
@@ -79,6 +86,7 @@ def offset_curve(
         )
         return narrow, corner_at
     beyond, step = bias.beyond, CURVE_STEP * settings.length
+    curve = close_random_bays(curve, bias.density, settings.length, surface)
     room = OFFSET_SHARE * room_across(curve, ROOM_ACROSS * settings.length, step)
     curve = curve + np.minimum(OFFSET_OF_BIAS * beyond, room)[:, None] * outward(surface, curve)
     at, places = _corners(curve, bias, settings, surface)
@@ -93,6 +101,59 @@ def offset_curve(
         share = explained(one - narrow, out, room, bias.density * step, WINDOW_SHIFT * beyond)
         smoothed = smoothed + share[:, None] * (one - smoothed)
     return smoothed, corner_at
+
+
+def close_random_bays(curve: np.ndarray, density: float, length: float, surface: Surface) -> np.ndarray:
+    """Return a closed curve (M, 3) of equal steps, the surface to its left, without the bays that random sampling makes in straight parts.
+
+    A disc that slides along points drawn at random falls into a gap between them and far into the surface, and the bay looks like a
+    corner. density : points per area [1 / scan unit^2]
+    """
+    step = CURVE_STEP * length
+    for _ in range(len(curve)):  # each bay that is closed takes away places
+        begin, places = _largest_bay(curve, outward(surface, curve), density, length)
+        if places == 0:
+            break
+        curve = np.roll(curve, -begin, axis=0)
+        curve = resample(np.concatenate([curve[:1], curve[places:]]), step)
+    return curve
+
+
+def _largest_bay(curve: np.ndarray, out: np.ndarray, density: float, length: float) -> tuple[int, int]:
+    """Return where the largest bay begins that random sampling explains, and how many steps it takes; (0, 0) if there is none."""
+    best, found = LEAST_BAY * length**2, (0, 0)
+    sides = [round(side / CURVE_STEP) for side in SIDES_OF_BAY]
+    before = [_unit(curve - np.roll(curve, side, axis=0)) for side in sides]
+    after = [np.roll(ahead, -side, axis=0) for ahead, side in zip(before, sides, strict=True)]
+    for places in range(4, min(round(LONGEST_BAY / CURVE_STEP), len(curve) // 4) + 1):
+        chord = np.roll(curve, -places, axis=0) - curve
+        mouth, ahead = np.linalg.norm(chord, axis=1), _unit(chord)
+        beside = [dots(side, ahead) for side in before + [np.roll(side, -places, axis=0) for side in after]]
+        goes_on = np.min(beside, axis=0) > COSINE_OF_SIDE
+        lengthened = places * CURVE_STEP * length > LENGTHENED * mouth
+        at = np.flatnonzero(goes_on & lengthened & (mouth < WIDEST_BAY * length))
+        if len(at):
+            area = _area_to_chord(curve, at, places, out)
+            area[area * density > POINTS_OF_RANDOM_BAY] = 0.0
+            k = int(area.argmax())
+            if area[k] > best:
+                best, found = float(area[k]), (int(at[k]), places)
+    return found
+
+
+def _unit(vectors: np.ndarray) -> np.ndarray:
+    """Return vectors (M, 3) with length one."""
+    unit: np.ndarray = vectors / np.maximum(np.linalg.norm(vectors, axis=1), 1e-300)[:, None]
+    return unit
+
+
+def _area_to_chord(curve: np.ndarray, begin: np.ndarray, places: int, out: np.ndarray) -> np.ndarray:
+    """Return the area (C,) between parts of a closed curve (M, 3) and their chords; negative where the curve lies outside its chord."""
+    around = (begin[:, None] + np.arange(places + 1)) % len(curve)
+    part = curve[around] - curve[around[:, :1]]
+    normal = _unit(np.cross(out[around].mean(axis=1), part[:, -1]))
+    area: np.ndarray = -0.5 * dots(np.cross(part[:, :-1], part[:, 1:]).sum(axis=1), normal)
+    return area
 
 
 def length_that_shows_corners(beyond: float, length: float) -> float:
@@ -127,11 +188,9 @@ def bays_at(curve: np.ndarray, at: np.ndarray, out: np.ndarray) -> np.ndarray:
     around = (at[:, None] + np.arange(-half, half + 1)) % len(curve)
     part, outwards = curve[around] - curve[around[:, :1]], out[around].mean(axis=1)
     chord, share = part[:, -1], np.linspace(0.0, 1.0, 2 * half + 1)[:, None]
-    normal = np.cross(outwards, chord)
-    normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-300)[:, None]
-    area = -0.5 * dots(np.cross(part[:, :-1], part[:, 1:]).sum(axis=1), normal)
     across = (chord[:, None] * share - part).sum(axis=1)
-    found: np.ndarray = np.where(dots(across, outwards) > BAY_COSINE * np.linalg.norm(across, axis=1), area, np.inf)
+    is_bay = dots(across, outwards) > BAY_COSINE * np.linalg.norm(across, axis=1)
+    found: np.ndarray = np.where(is_bay, _area_to_chord(curve, around[:, 0], 2 * half, out), np.inf)
     return found
 
 
