@@ -29,7 +29,7 @@ from scantruss.report import ladder
 from scantruss.report.advice import Advice
 from scantruss.report.ladder import HOPELESS_NEARBY, LEAST_TRIED, MOST_TRIED, SURE_PER_SPACING, TRIED_AROUND
 from scantruss.report.length_trial import LengthTrial, settled
-from scantruss.report.lengths import advice_lines, advice_rows, result_of
+from scantruss.report.lengths import advice_lines, advice_rows, result_of, usual_cause
 from scantruss.scan.member_length import length_range, round_length, suggest_length
 from scantruss.surface.samples import SurfaceSamples
 
@@ -232,6 +232,23 @@ def test_a_mesh_of_few_vertices_is_refused_with_a_way_on(
     assert words in capsys.readouterr().out
     assert main(["grid", str(path), str(tmp_path / "grid.json"), "--length", "2"]) == 2
     assert words in capsys.readouterr().err
+
+
+def test_where_no_length_passes_the_most_frequent_cause_is_said_with_its_place() -> None:
+    """Only that no length passes was said, and to clean or crop the scan, not what is wrong with it or where."""
+
+    def failed(length: float, *kinds: str) -> LengthTrial:
+        faults = tuple(Fault(kind, f"is {kind} at {length:g}", (length, 0.0, 1.5)) for kind in kinds)
+        grid = cast(Any, SimpleNamespace(certificate=SimpleNamespace(faults=faults)))
+        return LengthTrial(length, None, FrontError("no grid", grid))
+
+    trials = [failed(1.0, "manifold", "torn"), failed(2.0, "torn"), failed(3.0, "cover"), failed(4.0, "torn")]
+    assert (
+        usual_cause(trials) == ", 3 of 4 as the grid is torn at 2 (near 2, 0, 1.5); clean or crop the scan there first"
+    )
+    stopped = [LengthTrial(1.0, None, FrontError("the front stopped; try another", None, (0.0, 1.0, 2.0)))]
+    assert usual_cause(stopped) == ", 1 of 1 as the front stopped (near 0, 1, 2); clean or crop the scan there first"
+    assert usual_cause([]) == "; clean or crop the scan first"
 
 
 def test_a_suggestion_and_its_table_cost_no_more_than_so_many_grids_and_points(

@@ -13,6 +13,7 @@ import scantruss as st
 from scantruss.export.drawing import picture
 from scantruss.export.drawing.camera import choose_camera
 from scantruss.export.drawing.left_out import NO_GRID_COLOUR, Missed, Shown
+from scantruss.export.drawing.legend import Legend, Row
 from scantruss.export.drawing.picture import encode_picture
 from scantruss.export.drawing.style import PictureStyle
 from scantruss.grid.certificate import Certificate, Fault, LeftOut
@@ -34,6 +35,14 @@ def texts_of(
     monkeypatch.setattr(picture, "paint", paint)
     encode_picture(grid, cloud, style=PictureStyle(**style))
     return list(painted[0][2])
+
+
+def test_the_words_of_a_legend_stand_beside_its_longest_number() -> None:
+    """The words of the tenth row began in its number."""
+    rows = [Row("closes a hole", str(number)) for number in (1, 9, 10)]
+    signs, words = Legend(rows, (0.0, 0.0), 1.0).texts[::2], Legend(rows, (0.0, 0.0), 1.0).texts[1::2]
+    letter = Legend(rows[:2], (0.0, 0.0), 1.0).texts[1].x - signs[0].x
+    assert len({text.x for text in words}) == 1 and words[2].x - signs[2].x > letter + 0.5
 
 
 def turned_over(grid: st.Grid) -> st.Grid:

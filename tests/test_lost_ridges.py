@@ -34,7 +34,7 @@ def test_the_hips_of_a_roof_are_lost_at_long_members_and_said_with_length_and_en
     settings = st.Settings(length=2.8, effort="quick", unit="m")
     grid = st.grid_from_points(cloud, settings)
     (words,) = lost_of(grid)
-    assert words.startswith("loses ") and "m of ridges, across which members run" in words and " from (" in words
+    assert words.startswith("cuts across ridges of the scan: ") and " m in " in words and " from (" in words
     hips = np.hypot(np.hypot(4.0, 4.0), 4.0 * RISE)
     parts = lost_ridges(grid, cloud, settings)
     assert all(length_along(part) <= 1.1 * hips for part in parts)

@@ -20,7 +20,7 @@ from scantruss.boundary.find import find_boundary
 from scantruss.check.certify import Judged, judge
 from scantruss.constraints.find import find_constraints, wanted_ridges
 from scantruss.constraints.fold_tracing import Tracer
-from scantruss.constraints.lines_of_folds import is_even, parts_of_fold
+from scantruss.constraints.lines_of_folds import GAIN_OF_SURE, is_clear_on_rough, is_even, parts_of_fold
 from scantruss.constraints.ridge_ends import Ridge, join_ends
 from scantruss.constraints.ridges import find_ridges
 from scantruss.errors import FrontError
@@ -206,6 +206,25 @@ def test_what_bends_evenly_is_even() -> None:
     turn = 0.25 * np.arange(60)
     ring["place"][:, 0], ring["place"][:, 1] = np.cos(turn), np.sin(turn)
     assert is_even(ring, np.radians(40.0))
+
+
+@pytest.mark.parametrize(
+    ("members", "bend", "gain", "is_clear"),
+    [
+        (7.0, 50.0, 2.0, True),
+        (7.0, 50.0, 0.5, False),
+        (7.0, 60.0, 0.5, True),
+        (7.0, 30.0, 2.0, False),
+        (5.0, 50.0, 2.0, False),
+    ],
+)
+def test_among_places_that_only_look_folded_a_long_sure_line_is_a_ridge(
+    members: float, bend: float, gain: float, is_clear: bool
+) -> None:
+    """The foot of a pot turns by 50 degrees; its lip looks folded in hundreds of places. Gain in that of a sure line."""
+    folds = np.zeros(int(4 * members), FOLD)
+    folds["bend"], folds["gain"] = np.radians(bend), gain * GAIN_OF_SURE
+    assert is_clear_on_rough(folds, np.radians(40.0)) is is_clear
 
 
 def test_lines_of_folds_are_parted_at_their_corners() -> None:

@@ -78,7 +78,7 @@ def test_the_warning_names_length_ends_and_middle_of_each_part() -> None:
     (warning,) = found.warnings
     assert (
         warning.kind == "ridge"
-        and "gives up 9 m of ridges" in warning.words
+        and "gives up ridges where no grid passes with them: 9 m" in warning.words
         and "2 parts, the longest 8 m," in warning.words
     )
     assert warning.words.endswith("from (1, 0, 0) to (9, 0, 0)")

@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
+from marks import compiled_only
 from shapes import make
 from small_clouds import ball, cap, samples_of, sheet, tire, turn_of
 from steps import boundary_of
 
 from scantruss import InputError, PointCloud, Settings, grid_from_points
+from scantruss.grid.upward import facing_of
 from scantruss.kernels.geometry.boxes import new_boxes
 from scantruss.kernels.surface.local_surface import Surface
 from scantruss.kernels.surface.normals import (
@@ -388,6 +390,23 @@ def test_samples_without_rods_are_those_with_them_where_a_scan_has_none() -> Non
     alone = sample_surface(PointCloud.from_array(plate), wanted.replace(keep_rods=False))  # found by themselves
     assert np.array_equal(alone.surface.mean, usual.surface.mean) and np.array_equal(alone.judged, usual.judged)
     assert np.array_equal(alone.surface.normals, usual.surface.normals) and alone.pieces == usual.pieces
+
+
+@compiled_only
+@pytest.mark.parametrize("cells", ["triangle", "quad"])
+@pytest.mark.parametrize(("at", "upwards"), [((495_000.0, 5_420_000.0, 300.0), 1.0), ((0.0, 0.0, 0.0), -1.0)])
+def test_a_pit_on_a_map_gets_the_same_grid_turned_over(
+    at: tuple[float, float, float], upwards: float, cells: str
+) -> None:
+    """What has no unit is known by its coordinates; only the side that is outside changes."""
+    plan = np.random.default_rng(3).uniform(-10.0, 10.0, (8_000, 2))
+    pit = np.column_stack([plan, 0.03 * (plan**2).sum(axis=1)]) + at
+    grid = grid_from_points(PointCloud.from_array(pit), Settings(length=3.0, effort="quick", cells=cells))
+    assert grid.certificate is not None and grid.certificate.passed
+    assert upwards * facing_of(grid.nodes, grid.triangles)[2] > 0.5
+    panels = grid.nodes[grid.panel_table[:, :3]]
+    turns = np.cross(panels[:, 1] - panels[:, 0], panels[:, 2] - panels[:, 0])[:, 2]
+    assert (upwards * turns > 0.0).all()
 
 
 @pytest.mark.parametrize(("unit", "upwards"), [("m", True), ("", False)])

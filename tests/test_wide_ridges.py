@@ -12,7 +12,9 @@ from marks import compiled_only
 
 from scantruss import Grid, PointCloud, Settings, grid_from_points
 from scantruss.attempts.looks import follows_better
+from scantruss.attempts.lost_ridges import lost_ridges
 from scantruss.attempts.table import Attempt
+from scantruss.boundary.curves import length_along
 from scantruss.boundary.find import find_boundary
 from scantruss.check.unfollowed import crests_cut_off
 from scantruss.constraints.find import wide_folds
@@ -75,6 +77,9 @@ def test_a_grid_with_wide_ridges_is_nearer_to_the_scan(cloud: PointCloud) -> Non
     assert made.certificate is not None and made.certificate.passed
     assert len(made.lines) > len(plain.lines) and follows_better(made, plain)
     assert not follows_better(plain, made)
+    assert not lost_ridges(made, cloud, settings)
+    lost = lost_ridges(plain, cloud, settings)  # what no ridge follows is said
+    assert sum(map(length_along, lost)) > 2.0 * (2.0 * HALF)
 
 
 @compiled_only

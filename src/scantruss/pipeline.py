@@ -24,7 +24,9 @@ from .constraints.find import find_constraints, made_folds, wide_folds
 from .errors import CertificateError, FrontError, ScanTrussError
 from .front.orientation_field import orientation_fields
 from .grid.grid import Grid
+from .grid.upward import facing_up
 from .runtime.progress import Progress, seer_of
+from .scan.checks import lies_on_map
 from .scan.cloud import PointCloud
 from .scan.member_length import check_length
 from .scan.stream.fit import read_to_fit
@@ -125,6 +127,7 @@ def grid_from_cloud(
         if not keep_failed or not len(refused.grid.triangles):
             raise
         grid = refused.grid.replace(settings=settings)
+    grid = facing_up(grid) if lies_on_map(cloud.origin, cloud.extent) else grid
     return grid.replace(seconds=watch.seconds())
 
 

@@ -10,7 +10,7 @@ from ..boundary.curves import length_along
 from ..check.distances import distances_to_grid
 from ..check.left_out import points_together
 from ..check.limits import COVER_REACH, NOISES_OFF
-from ..constraints.lines_of_folds import FOLD_STRIDE, GAIN_OF_SURE
+from ..constraints.lines_of_folds import FOLD_STRIDE, GAIN_OF_SURE, is_made
 from ..constraints.network import runs
 from ..constraints.ridges import fold_lines
 from ..errors import ScanTrussError
@@ -46,6 +46,7 @@ def lost_ridges(
     """Return the parts of folds of a scan that a grid cuts across, the longest first, each (K, 3) [scan unit].
 
     They are looked for at half of the member length: folds too close together, or too short, to be ridges at the whole are seen there.
+    Wide folds that were made are looked for at the whole, too.
 
     Parameters
     ----------
@@ -60,21 +61,32 @@ def lost_ridges(
     finer = max(FINER * length, FEWEST_SPACINGS_OF_FINER * cloud.spacing)
     if finer > COARSEST_FINER * length or not _may_cut_folds(grid, cloud, made, length):
         return []
-    settings = made.replace(length=finer, length_field="", ridge_angle=asked.ridge_angle, limb_girth=0.0)
-    try:
-        samples = sample_surface(cloud, settings)
-        lines = [] if samples.smooth else fold_lines(samples, settings).narrow
-    except ScanTrussError:  # it carries no grid of such members, or its folds are a tangle
-        return []
     known = np.concatenate([_places_on_chains(grid), *(part - cloud.origin for part in given_up)])
-    found = []
-    for folds in lines:
-        if np.median(folds["gain"]) >= GAIN_OF_SURE:
-            cut = _is_cut(folds["place"], grid, length, known, round(length / (FOLD_STRIDE * finer)))
-            found += [folds["place"][begin:end] for begin, end in runs(cut)]
-    found = [part + cloud.origin for part in found if length_along(part) >= SHORTEST_LOST * length]
+    found: list[np.ndarray] = []
+    for step in (finer, length):
+        narrow, wide = _folds(
+            cloud, made.replace(length=step, length_field="", ridge_angle=asked.ridge_angle, limb_girth=0.0)
+        )
+        for places in narrow + wide if step == finer else wide:
+            cut = _is_cut(places, grid, length, np.concatenate([known, *found]), round(length / (FOLD_STRIDE * step)))
+            parts = [places[begin:end] for begin, end in runs(cut)]
+            found += [part for part in parts if length_along(part) >= SHORTEST_LOST * length]
+    found = [part + cloud.origin for part in found]
     found.sort(key=length_along, reverse=True)
     return found if sum(map(length_along, found)) >= LEAST_LOST * length else []
+
+
+def _folds(cloud: PointCloud, settings: Settings) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """Return the places (K, 3) along each narrow fold of a scan that is sure, and along each wide one that was made."""
+    try:
+        samples = sample_surface(cloud, settings)
+        found = None if samples.smooth else fold_lines(samples, settings)
+        if found is None:
+            return [], []
+        narrow = [folds["place"] for folds in found.narrow if np.median(folds["gain"]) >= GAIN_OF_SURE]
+        return narrow, [folds["place"] for folds in found.wide if is_made(folds)]
+    except ScanTrussError:  # it carries no grid of such members, or its folds are a tangle
+        return [], []
 
 
 def _may_cut_folds(grid: Grid, cloud: PointCloud, made: Settings, length: float) -> bool:

@@ -165,26 +165,24 @@ def places_to_look_at(found: Certificate, missed_at: Place, rounded: float = 0.0
 
 def with_ridges_given_up(grid: Grid, parts: Sequence[np.ndarray]) -> Grid:
     """Return a grid with a warning of the parts of ridges that it gives up, the longest first, each (K, 3); as it is without any."""
-    return _with_ridges(grid, parts, "gives up {} of ridges where no grid passes with them")
+    return _with_ridges(grid, parts, "gives up ridges where no grid passes with them")
 
 
 def with_ridges_lost(grid: Grid, parts: Sequence[np.ndarray]) -> Grid:
     """Return a grid with a warning of the parts of folds that it cuts across, as `with_ridges_given_up`."""
-    return _with_ridges(
-        grid, parts, "loses {} of ridges, across which members run", "lost", "; shorter members may follow them"
-    )
+    return _with_ridges(grid, parts, "cuts across ridges of the scan", "lost", "; shorter members may follow them")
 
 
 def _with_ridges(grid: Grid, parts: Sequence[np.ndarray], said: str, kind: str = "ridge", advice: str = "") -> Grid:
-    """Return a grid with a warning of parts of ridges; `said` of how long they are."""
+    """Return a grid with a warning of parts of ridges: what is `said`, how long they are, and where the longest goes."""
     found = grid.certificate
     if found is None or not parts:
         return grid
     unit, longest = f" {grid.unit}" if grid.unit else "", parts[0]
     whole, of_longest = (words_of_number(each, 3) for each in (sum(map(length_along, parts)), length_along(longest)))
-    more = f", {len(parts)} parts, the longest {of_longest}{unit}," if len(parts) > 1 else ""
+    more = f" in {len(parts)} parts, the longest {of_longest}{unit}," if len(parts) > 1 else ""
     ends = f"from ({words_of_place(longest[0])}) to ({words_of_place(longest[-1])})"
-    words = f"{said.format(f'{whole}{unit}')}{more} {ends}{advice}"
+    words = f"{said}: {whole}{unit}{more} {ends}{advice}"
     at, *others = (place_of(part[len(part) // 2]) for part in parts[:PLACES_KEPT])
     warning = Fault(kind, words, at, tuple(others))
     return grid.replace(certificate=replace(found, warnings=(*found.warnings, warning)))

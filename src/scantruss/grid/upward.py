@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..scan.cloud import SURVEY_UNITS
+from .panels import turned_panels
 
 if TYPE_CHECKING:
     from ..scan.cloud import PointCloud
@@ -55,6 +57,21 @@ def picture_notes(grid: Grid, cloud: PointCloud | None = None) -> list[str]:
     up = guessed_up(grid, cloud)
     return (
         [f"the picture shows {up} up, which is guessed from the shape; in files and structures z is up"] if up else []
+    )
+
+
+def facing_up(grid: Grid) -> Grid:
+    """Return a grid on a map turned over where it is an open sheet that faces down, as a quarry whose centre lies above it; else as it is.
+
+    It is turned over when it is made: which way its scan faces has a say in its front.
+    """
+    found = grid.certificate
+    if facing_of(grid.nodes, grid.triangles)[2] > -OPEN_SHELL:
+        return grid
+    return grid.replace(
+        triangles=np.ascontiguousarray(grid.triangles[:, ::-1]),
+        panels=None if grid.panels is None else turned_panels(grid.panels, np.ones(len(grid.panels), np.bool_)),
+        certificate=None if found is None else replace(found, node_bias=-found.node_bias),
     )
 
 

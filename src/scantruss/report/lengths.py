@@ -9,6 +9,7 @@ import numpy as np
 from ..errors import words_of_number, words_of_place
 
 if TYPE_CHECKING:
+    from ..errors import Place
     from ..scan.cloud import PointCloud
     from .advice import Advice
     from .length_trial import LengthTrial
@@ -106,10 +107,28 @@ def advice_lines(advice: Advice, length: float, cloud: PointCloud) -> list[str]:
         near = min(passing, key=lambda other: abs(np.log(other / length)), default=None)
         near = advice.nearby(length) if near is None and not advice.is_spent else near
         lines += [f"at {length:g}{unit}: {_no_grid(trial)}: {_why(trial)}{place}"]
-        lines += [f"try --length {near:g}" if near else "no length passes of those tried; clean or crop the scan first"]
+        lines += [f"try --length {near:g}" if near else f"no length passes of those tried{usual_cause(advice.tried)}"]
     else:
         lines.append(f"try --length {length:g}")
     return lines
+
+
+def usual_cause(trials: list[LengthTrial]) -> str:
+    """Return why most lengths that were tried get no grid, as at one of them that gets none for this, and what to do."""
+    causes: dict[str, list[tuple[str, Place | None]]] = {}
+    for fault in (trial.fault for trial in trials if trial.fault is not None):
+        found = fault.grid.certificate if fault.grid is not None else None
+        faults = {
+            each.kind: (f"the grid {each.words}", each.where) for each in (found.faults if found is not None else ())
+        }
+        for kind, cause in (faults or {str(fault): (str(fault), fault.where)}).items():
+            causes.setdefault(kind, []).append(cause)
+    if not causes:
+        return "; clean or crop the scan first"
+    own = max(causes.values(), key=len)
+    words, where = own[len(own) // 2]
+    place = "" if where is None else f" (near {words_of_place(where)})"
+    return f", {len(own)} of {len(trials)} as {words.partition(';')[0]}{place}; clean or crop the scan there first"
 
 
 def passing_lines(trials: list[LengthTrial], unit: str) -> list[str]:

@@ -19,6 +19,7 @@ POINTS_OF_BULK = 100_000  # points from which the bulk of a scan is measured
 FARTHEST_FROM_BULK = 5.0  # diagonals of the bulk of a scan from its middle, beyond which a point is an outlier
 BULK_PERCENTILES = (2.0, 98.0)  # percentiles of each coordinate between which the bulk lies
 POINTS_OF_MIDDLE = 2_000  # points from which the middle half of a scan is measured
+FAR_ON_MAP = 100.0  # extents of a scan from zero from which on it lies on a map
 FEWEST_POINTS = 100  # points below which no value is called invalid
 FARTHEST_FROM_MIDDLE = 1e6  # widths of the middle half of a scan from its middle, beyond which a value is invalid
 RASTER_COLUMNS = 4.0  # most different x of a raster, in square roots of its number of points
@@ -53,6 +54,11 @@ def extent_of(points: np.ndarray) -> np.ndarray:
     some = points[:: max(len(points) // POINTS_OF_EXTENT, 1)]
     some = some[np.isfinite(some).all(axis=1)].astype(np.float64)  # integers have no inf
     return np.stack([some.min(axis=0, initial=np.inf), some.max(axis=0, initial=-np.inf)])
+
+
+def lies_on_map(origin: np.ndarray, extent: float) -> bool:
+    """Whether a scan so large lies so far from zero (3,) as on a map, in x and in y, and less far in z."""
+    return bool(np.abs(origin[:2]).min() > max(FAR_ON_MAP * extent, abs(origin[2])))
 
 
 def bulk_of(points: np.ndarray) -> np.ndarray:

@@ -63,7 +63,7 @@ class Legend:
         (x, y), em, texts = self.corner, self.em, []
         for number, row in enumerate(self.rows):
             at = y - number * LEGEND_LINE * em
-            words = Text(x + LEGEND_SIGN * em, at, row.words, em, "left")
+            words = Text(x + signs_wide(self.rows) * em, at, row.words, em, "left")
             texts += [Text(x, at, row.sign, em, "left", row.colour), words] if row.sign else []
             texts += [] if row.sign else [Text(x, at, row.words, em, "left", row.colour)]
         return texts
@@ -75,7 +75,7 @@ class Legend:
         if not self.rows:
             return [box]
         left, bottom, right, top = box
-        wide = LEGEND_SIGN + LEGEND_LETTER * max(len(row.words) for row in self.rows)
+        wide = signs_wide(self.rows) + LEGEND_LETTER * max(len(row.words) for row in self.rows)
         end = self.corner[1] - (len(self.rows) * LEGEND_LINE + 0.4) * self.em
         below = (left, bottom, right, max(min(top, end), bottom + LEAST_LEFT_BY_LEGEND * (top - bottom)))
         beside = (self.corner[0] + (wide + 2.0) * self.em, bottom, right, top)
@@ -104,11 +104,16 @@ class Mark:
     kind: str = ""  #: of the fault or warning
 
 
+def signs_wide(rows: Iterable[Row]) -> float:
+    """Return from how far on the words of a legend stand, beside its longest sign [em]."""
+    return LEGEND_SIGN + LEGEND_LETTER * max((len(row.sign) - 1 for row in rows if row.sign), default=0)
+
+
 def wrapped_rows(rows: Iterable[Row], wide: float, em: float) -> list[Row]:
     """Return the rows of a legend in lines no wider than a picture [pixel]; further lines of a row stand below its words."""
-    most = max(int((wide / em - LEGEND_SIGN) / LEGEND_LETTER), 20)
-    lines = []
-    for row in rows:
+    given, lines = list(rows), []
+    most = max(int((wide / em - signs_wide(given)) / LEGEND_LETTER), 20)
+    for row in given:
         first, *more = wrap(row.words, most) or [""]
         below = row.sign and " "
         lines += [row._replace(words=first), *(Row(words, below, row.colour) for words in more)]
