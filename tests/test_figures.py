@@ -12,7 +12,7 @@ from small_grids import dome
 from scantruss import Certificate, Grid, Settings
 from scantruss.check.limits import places_to_look_at
 from scantruss.errors import words_of_number
-from scantruss.grid.certificate import LeftOut, Spread, Worst
+from scantruss.grid.certificate import Fault, LeftOut, Spread, Worst
 from scantruss.kernels.geometry.components import component_labels
 from scantruss.report.figures import distance_lines, left_out_lines, line_lines
 from scantruss.report.terminal import print_table
@@ -105,6 +105,8 @@ def test_no_ridge_is_only_said_to_be_there_where_no_fold_is_sharp(sharpest: floa
     grid = dataclasses.replace(dome(), certificate=found, settings=Settings(length=4.0, ridge_angle=40.0))
     (line,) = line_lines(grid)
     assert line.startswith(words)
+    lost = dataclasses.replace(found, warnings=(Fault("lost", "cuts across ridges of the scan: 3 m"),))
+    assert line_lines(dataclasses.replace(grid, certificate=lost)) == ["no ridge is followed"]
 
 
 def test_in_a_table_words_start_and_figures_end_below_each_other(capsys: pytest.CaptureFixture[str]) -> None:

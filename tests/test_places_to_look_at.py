@@ -471,6 +471,9 @@ def test_the_verdict_says_how_much_was_left_out_as_asked_for() -> None:
         "left out: 13,856 points (27.16%) outside the box, near (1, 2, 3), 1,460 mm across, as asked for"
     ]
     assert "asked" not in str(replace(found, left_out=()))
+    nowhere = LeftOut("with NaN or infinite coordinates", 120, 0.01, asked=True)  # which nobody asked for
+    only = replace(found, left_out=(nowhere,))
+    assert "asked" not in str(only) + left_out_lines(only)[0]
 
 
 def test_a_corner_where_no_scan_is_cannot_be_cut_off() -> None:

@@ -1,5 +1,7 @@
 """Sheets side by side, a fraction of a member apart, are told apart by links, boundaries and cover."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hard_scans import hard
@@ -13,6 +15,7 @@ import scantruss as st
 from scantruss.check.certify import certify
 from scantruss.check.sheets import faults_on_sheets, nodes_of_samples
 from scantruss.kernels.boundary import room as kernels
+from scantruss.kernels.mesh import sheets as mesh_kernels
 from scantruss.kernels.surface import normals as facing
 from scantruss.pipeline import grid_from_cloud
 from scantruss.surface.samples import sample_surface
@@ -53,11 +56,11 @@ def test_a_grid_of_one_sheet_does_not_cover_the_next() -> None:
     both = grid_from_cloud(cloud, settings)
     assert both.topology.components == 2
     samples = sample_surface(cloud, settings)
-    assert faults_on_sheets(both, samples, nodes_of_samples(both, samples, 1.0)) == []
+    assert faults_on_sheets(both, samples, nodes_of_samples(both, samples, 1.0), 1.0) == []
     lower = both.triangles[both.nodes[both.triangles[:, 0], 2] < both.nodes[:, 2].mean()]
     used, numbered = np.unique(lower, return_inverse=True)
     half = both.replace(nodes=both.nodes[used], triangles=numbered.reshape(-1, 3))
-    (fault,) = faults_on_sheets(half, samples, nodes_of_samples(half, samples, 1.0))
+    (fault,) = faults_on_sheets(half, samples, nodes_of_samples(half, samples, 1.0), 1.0)
     assert fault.kind == "cover" and fault.words.startswith("leaves out 50%") and fault.where is not None
 
 
@@ -113,13 +116,18 @@ def test_a_grid_that_is_cut_where_the_scan_is_whole_is_refused() -> None:
     settings = st.Settings(length=1.0, effort="quick")
     cloud = st.PointCloud.from_array(sheet(10, 10, 0.12, seed=2))
     grid, samples = grid_from_cloud(cloud, settings), sample_surface(cloud, settings)
-    assert faults_on_sheets(grid, samples, nodes_of_samples(grid, samples, 1.0)) == []
+    assert faults_on_sheets(grid, samples, nodes_of_samples(grid, samples, 1.0), 1.0) == []
     x, y = (grid.nodes[grid.triangles][:, :, axis].mean(axis=1) for axis in (0, 1))
     slit = (abs(x) < 0.6) & (y < 1.5)
     disconnected = grid.replace(triangles=grid.triangles[~slit])
-    (fault,) = faults_on_sheets(disconnected, samples, nodes_of_samples(disconnected, samples, 1.0))
+    nearest = nodes_of_samples(disconnected, samples, 1.0)
+    (fault,) = faults_on_sheets(disconnected, samples, nearest, 1.0)
     x, y, _ = known(fault.where)
     assert fault.kind == "torn" and abs(x) < 1.5 and y < 2.5
+    points = samples.surface.points.copy()
+    points[(abs(points[:, 0]) < 1.7) & (points[:, 1] < 3.0), 2] += 50.0
+    slit_scan = replace(samples, surface=samples.surface._replace(points=points))
+    assert faults_on_sheets(disconnected, slit_scan, nearest, 1.0) == []  # links over a slit of the scan
 
 
 def test_certificates_of_one_scan_can_be_made_side_by_side() -> None:
@@ -132,3 +140,18 @@ def test_certificates_of_one_scan_can_be_made_side_by_side() -> None:
     assert certify(grid, samples, boundary, settings).passed
     for array, kept in zip((surface.stamp, surface.queue, surface.counter), before, strict=True):
         assert (array == kept).all()
+
+
+@pytest.mark.kernels
+def test_linked_samples_are_noted_whose_nodes_are_far_apart() -> None:
+    """Three samples in a row, linked to each other, with the nodes of a chain of six: the first and the last are four members apart."""
+    links = np.array([[1, 2], [0, 2], [0, 1]])
+    normals, nearest = np.tile([0.0, 0.0, 1.0], (3, 1)), np.array([0, 2, 4])
+    first, ends = np.array([0, 1, 3, 5, 7, 9, 10]), np.array([1, 0, 2, 1, 3, 2, 4, 3, 5, 4])
+    torn = np.full((4, 2), -1)
+    assert mesh_kernels.note_disconnected(links, normals, nearest, first, ends, 3, torn) == 1
+    assert torn.tolist() == [[0, 2], [-1, -1], [-1, -1], [-1, -1]]
+    assert mesh_kernels.note_disconnected(links, normals, nearest, first, ends, 1, torn) == 3
+    assert mesh_kernels.note_disconnected(links, normals, nearest, first, ends, 1, torn[:2]) == 2
+    normals[2] *= -1
+    assert mesh_kernels.note_disconnected(links, normals, nearest, first, ends, 3, torn) == 0

@@ -177,7 +177,7 @@ def judge(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings: Set
     known = {fault.kind for fault in faults}
     further = (
         *too_far,
-        *faults_on_sheets(grid, samples, nearest),
+        *faults_on_sheets(grid, samples, nearest, length),
         *hanging_nodes(grid, samples, found, length),
         *nodes_off_sheets(grid, samples, length),
         *spikes(grid, samples, found, length),

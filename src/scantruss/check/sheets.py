@@ -8,8 +8,9 @@ import numpy as np
 
 from ..grid.certificate import Fault, place_of
 from ..kernels.geometry.components import component_labels
-from ..kernels.mesh.sheets import first_disconnected, nearest_nodes
+from ..kernels.mesh.sheets import nearest_nodes, note_disconnected
 from ..surface.chosen_samples import KEPT, LIMB
+from ..surface.near_scan import distance_from_scan
 from ..surface.scratch import with_own_scratch
 from .left_out import LIMBS_APART, points_together
 
@@ -24,6 +25,9 @@ FARTHEST_COVERED = 1.2
 LEFT_OUT = 0.2  # share of the sheets that a grid may leave out
 MEMBERS_APART_TORN = 4  # members between two nodes from which on neighbouring parts of the scan are torn apart
 FEWEST_LINKS = 3  # fewest links between such parts that are no accident
+MOST_LINKS = 1000  # most that are looked at
+# farthest that the middle of a link lies from the scan, at least: it spans a slit else [member lengths, spacings of the points]
+MIDDLE_OFF, SPACINGS_OFF = 0.25, 2.0
 # gap between points of one side of a break, and distance from it of those beside it [member lengths]
 BESIDE_BREAK = 0.25
 SPACINGS_BESIDE_BREAK = 1.5  # ... and in spacings of the points
@@ -38,8 +42,8 @@ def nodes_of_samples(grid: Grid, samples: SurfaceSamples, length: float) -> np.n
     return nearest
 
 
-def faults_on_sheets(grid: Grid, samples: SurfaceSamples, nearest: np.ndarray) -> list[Fault]:
-    """Return what is wrong with how a grid covers each sheet of the scan; nearest (S,) as `nodes_of_samples`."""
+def faults_on_sheets(grid: Grid, samples: SurfaceSamples, nearest: np.ndarray, length: float) -> list[Fault]:
+    """Return what is wrong with how a grid covers each sheet of the scan; nearest (S,) and length as `nodes_of_samples`."""
     wanted = ~np.isin(samples.piece, samples.not_chosen)
     left = np.flatnonzero(((nearest < 0) | ~samples.kept) & wanted)
     share = len(left) / max(int(wanted.sum()), 1)
@@ -47,7 +51,7 @@ def faults_on_sheets(grid: Grid, samples: SurfaceSamples, nearest: np.ndarray) -
     if share > LEFT_OUT:
         where = place_of(samples.surface.mean[left[0]] + grid.origin)
         faults.append(Fault("cover", f"leaves out {share:.0%} of the sheets of the scan", where))
-    disconnected = disconnected_place(grid, samples, nearest)
+    disconnected = disconnected_place(grid, samples, nearest, length)
     if disconnected is not None:
         words = "is torn where the scan is whole, as at a handle thinner than its members"
         faults.append(Fault("torn", words, place_of(disconnected + grid.origin)))
@@ -102,21 +106,29 @@ def broken_limb(samples: SurfaceSamples, limb: np.ndarray, distance: np.ndarray,
     return None
 
 
-def disconnected_place(grid: Grid, samples: SurfaceSamples, nearest: np.ndarray) -> np.ndarray | None:
+def disconnected_place(grid: Grid, samples: SurfaceSamples, nearest: np.ndarray, length: float) -> np.ndarray | None:
     """Return a place (3,) where the grid is torn though the scan is whole; None where there is none.
 
     Each node has a part of the scan, the samples nearest to it. Where two parts meet, their nodes must be near each other in the grid:
-    joined by fewer than `MEMBERS_APART_TORN` members one after the other.
+    joined by fewer than `MEMBERS_APART_TORN` members one after the other. Parts on both sides of a slit may be linked, and do not meet.
 
     Parameters
     ----------
     nearest : (S,) int64
         Node of each sample, as `nodes_of_samples`.
+    length : float
+        Desired member length [scan unit].
     """
     pairs = np.concatenate([grid.edges, grid.edges[:, ::-1]])
     first = np.concatenate([[0], np.cumsum(np.bincount(pairs[:, 0], minlength=len(grid.nodes)))])
     ends = pairs[np.argsort(pairs[:, 0], kind="stable"), 1]
-    links, normals = samples.surface.neighbors, samples.surface.normals
+    surface, torn = samples.surface, np.empty((MOST_LINKS, 2), np.int64)
     near = max(MEMBERS_APART_TORN - 1, grid.panel_table.shape[1] // 2 + 1)  # a member more than nodes of one panel
-    sample = first_disconnected(links, normals, nearest, first, ends, near, FEWEST_LINKS)
-    return samples.surface.mean[sample] if sample >= 0 else None
+    found = note_disconnected(surface.neighbors, surface.normals, nearest, first, ends, near, torn)
+    off, apart = max(MIDDLE_OFF * length, SPACINGS_OFF * samples.spacing), list[int]()
+    for one, two in torn[:found].tolist():
+        if distance_from_scan(surface, 0.5 * (surface.mean[one] + surface.mean[two])) <= off:
+            apart.append(one)
+        if len(apart) == FEWEST_LINKS:
+            return np.asarray(surface.mean[apart[0]])
+    return None

@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass, fields
 from typing import TYPE_CHECKING, Any
 
 from ..errors import CertificateError, Place, words_of_number, words_of_place
+from ..scan.cloud import WITHOUT_COORDINATES
 
 if TYPE_CHECKING:
     from .grid import Grid
@@ -149,7 +150,7 @@ class Certificate:
     @property
     def asked_out(self) -> float:
         """Share of the points of the file that settings left out, as by a crop, a class or a piece."""
-        return sum(part.share for part in self.left_out if part.asked)
+        return sum(part.share for part in self.left_out if part.asked and part.kind != WITHOUT_COORDINATES)
 
     @property
     def farthest_listed(self) -> LeftOut | None:

@@ -13,6 +13,7 @@ from ..grid.certificate import near
 from ..grid.line_sets import FIXED_LINE, RIDGE, sets_of
 from ..kernels.geometry.components import component_labels
 from ..scan.checks import usual_extent
+from ..scan.cloud import WITHOUT_COORDINATES
 
 if TYPE_CHECKING:
     from ..boundary.find import Boundary
@@ -156,8 +157,9 @@ def line_lines(grid: Grid) -> list[str]:
     if made is not None and made.ridge_angle > 0.0 and made.method == "default" and not sets_of(grid, RIDGE):
         level, found = 180.0 - made.ridge_angle, grid.certificate
         sharp = found is not None and found.sharpest_fold is not None and found.sharpest_fold.value < level
+        lost = found is not None and any(warning.kind in ("lost", "ridge") for warning in found.warnings)
         none = f": no sharp edge is folded to less than {level:g} degrees, 180 is level"
-        lines.append("no ridge is followed" if sharp else f"no ridge{none}")
+        lines.append("no ridge is followed" if sharp or lost else f"no ridge{none}")
     return lines
 
 
@@ -226,7 +228,7 @@ def left_out_lines(certificate: Certificate) -> list[str]:
             place = f", {some} near ({words_of_place(part.where)})" + f", {size}" * (part.together > 1)
         place = f", up to {words_of_number(part.size or 0.0, 3)}{unit} across" if part.number > 1 else place
         count = f"{words_of_count(part.points, 'point')} ({part.share:.2%}) " if part.points else ""
-        asked = ", as asked for" if part.asked else ""
+        asked = ", as asked for" if part.asked and part.kind != WITHOUT_COORDINATES else ""
         lines.append(f"left out: {count}{part.words}{place}{asked}" if count else f"{part.words}{place}")
     return lines
 

@@ -33,6 +33,7 @@ INVALID_COORDINATES = "with coordinates a million times too large"
 AT_NO_DATA = "with a height that stands for no data"
 AT_NO_DATA_PLACE = "at a place that stands for no data"
 LARGEST_COORDINATE = 1e100  # coordinates beyond this overflow when squared
+WITHOUT_COORDINATES = "with NaN or infinite coordinates"  # why points are not read
 SURVEY_UNITS = ("m", "foot")  # scans in these have z up
 SURVEY_FILES = (".las", ".laz", ".e57", ".pts", ".ptx")  # files of scans that have z up, whatever their unit
 MOST_COPIES = 5  # times that a scan may be stored with every point repeated

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ..report.figures import left_out_lines
-from ..surface.samples import WITHOUT_COORDINATES
+from ..scan.cloud import WITHOUT_COORDINATES
 from .scan_parts import selected
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from ..kernels.surface.local_surface import Surface
 from ..runtime.parallel import in_parts
 from ..scan.clean.duplicates import find_repeated, has_repeats
 from ..scan.clean.streamline import points_near
-from ..scan.cloud import Bounds, PointCloud, bounds_of
+from ..scan.cloud import WITHOUT_COORDINATES, Bounds, PointCloud, bounds_of
 from ..scan.normals import mean_normals
 from ..settings import SAMPLE_SPACING, SMOOTH_SAMPLE_SPACING, Settings
 from .body import opened_body
@@ -46,7 +46,6 @@ from .thin_walls import normals_of_walls
 BESIDE_SAMPLES = 1.5  # distance from points of the boundary within which all points are used [`sample_spacing`]
 UNCLEANED_DISTANCE = 3.0  # as `Settings.outlier_distance`, where a scan is not cleaned
 BROAD_PASSES = 4  # times that normals are averaged with those beside them for the sheet as a whole
-WITHOUT_COORDINATES = "with NaN or infinite coordinates"  # why points are not read
 POINTS_OF_KEPT_SAMPLES = (
     500_000  # points of a cloud with which samples of several settings are kept, that often; else the last ones
 )

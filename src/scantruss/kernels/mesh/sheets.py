@@ -45,16 +45,16 @@ def nearest_nodes(surface: Surface, boxes: SearchBoxes, nodes: np.ndarray, reach
 
 
 @kernel
-def first_disconnected(
+def note_disconnected(
     links: np.ndarray,
     normals: np.ndarray,
     nearest: np.ndarray,
     first: np.ndarray,
     ends: np.ndarray,
     most: int,
-    enough: int,
+    torn: np.ndarray,
 ) -> int:
-    """The first sample whose node is far in the grid from the node of a linked sample; -1 if there are fewer than `enough` such links.
+    """Note the linked samples whose nodes are far from each other in the grid; returns how many there are, at most as there is room for.
 
     Parameters
     ----------
@@ -63,9 +63,10 @@ def first_disconnected(
     nearest : (S,) int64, node of each sample, -1 for none
     first, ends : (V + 1,) and (2 E,) int64, the nodes at the other ends of the members of each node
     most : members between two nodes up to which they are close
+    torn : (T, 2) int64, filled
     """
     stamp, queue = np.full(len(first) - 1, -1, np.int64), np.empty(len(first) - 1, np.int64)
-    disconnected, sample, number = 0, -1, 0
+    count_torn, number = 0, 0
     for s in range(len(nearest)):
         a = nearest[s]
         for k in range(links.shape[1] if a >= 0 else 0):
@@ -89,7 +90,8 @@ def first_disconnected(
                 if found:
                     break
             if not found:
-                disconnected += 1
-                if sample < 0:
-                    sample = s
-    return sample if disconnected >= enough else -1
+                torn[count_torn, 0], torn[count_torn, 1] = s, links[s, k]
+                count_torn += 1
+                if count_torn == len(torn):
+                    return count_torn
+    return count_torn
