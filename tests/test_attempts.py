@@ -14,7 +14,7 @@ from small_clouds import ball, cap, sheet
 import scantruss as st
 from scantruss.attempts.course import RIDGES_GIVEN_UP, WITHOUT_RODS, AttemptCourse
 from scantruss.attempts.limit import MOST_RUNS
-from scantruss.attempts.table import AS_ASKED, ROWS_TRIED, TURNED_ROWS, Attempt, attempts
+from scantruss.attempts.table import AS_ASKED, ROWS_TRIED, TURNED_ROWS, Attempt, AttemptRow, attempts
 from scantruss.errors import FrontError
 
 NAMES = [row.name for row in ROWS_TRIED]
@@ -76,6 +76,21 @@ def test_an_attempt_differs_from_what_was_asked_in_what_its_row_says_and_rows_be
             assert attempt.faults == () and not attempt.is_trial
         if own and row.stays:
             base = own[0].settings
+
+
+def test_a_look_that_fails_ends_no_list() -> None:
+    """Where the boundary of a scan cannot be followed, looks at it fail too: samples a little farther apart are tried all the same."""
+
+    def fails(scan: Any, now: Any) -> bool:
+        raise FrontError("the boundary cannot be followed")
+
+    rows = [
+        AttemptRow("first", slice(1)),
+        AttemptRow("looked at", slice(1), fails),
+        AttemptRow("last", slice(1), shares={"length": 2.0}),
+    ]
+    tried = attempts(st.PointCloud.from_array(cap(4.0, 1.0, 0.25)), st.Settings(length=1.0), rows)
+    assert [each.row for each in tried] == ["first", "last"]
 
 
 def test_a_lattice_turned_is_tried_where_all_grids_begin_from_one() -> None:

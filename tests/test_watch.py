@@ -44,6 +44,10 @@ def test_each_stage_is_watched(monkeypatch: pytest.MonkeyPatch, module: object, 
     assert where is not None and np.linalg.norm(shape.points - where, axis=1).min() < shape.length
 
 
+def small_scan() -> tuple[st.PointCloud, st.Settings]:
+    return st.PointCloud.from_array(make("gable", 10_000).points), st.Settings(length=make("gable", 10_000).length)
+
+
 def test_triangles_that_cannot_be_told_apart_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     """A search that meets nothing but triangles near each other ends, whatever is among those that it has not seen."""
     monkeypatch.setattr(crossings, "NEAR_A_TRIANGLE", 0)
@@ -52,3 +56,10 @@ def test_triangles_that_cannot_be_told_apart_are_refused(monkeypatch: pytest.Mon
     nodes = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0.2, 0.2, -1), (0.2, 0.2, 1), (2, 2, 0)], float)
     with pytest.raises(st.FrontError, match="can be told apart"):
         crossings.find_crossings(nodes, np.array([(0, 1, 2), (3, 4, 5)]))
+
+
+def test_one_disc_that_is_caught_may_be_tried_again_as_often_as_is_allowed() -> None:
+    """Of a small scan each try may touch thousands of samples: a lion at twice its length was refused at the first."""
+    rolling = rolling_disc._RollingDisc(st.sample_surface(*small_scan()).surface, np.ones(1), 10, np.zeros(3))
+    for _ in range(2 * rolling_disc.MOST_TRIES):
+        rolling.watch.note(len(rolling.path), np.zeros(3))

@@ -14,7 +14,7 @@ from ..cells.make import settings_of_triangles
 from ..check.refusal import MOST_ACCEPTED
 from ..constraints.find import ridges_away_from, ridges_given_up, wide_folds
 from ..constraints.ridges import FAULT_REACH
-from ..errors import CertificateError, words_of_place
+from ..errors import CertificateError, FrontError, words_of_place
 from ..front.orientation_field import FieldStart
 from ..settings import SAMPLE_SPACING
 from ..surface.samples import sample_surface
@@ -22,7 +22,7 @@ from .limit import FAR_MISSING, only_leaves_out
 from .looks import ROUGH_SCAN, VERY_ROUGH_SCAN, AskedScan, has_one_lattice
 
 if TYPE_CHECKING:
-    from ..errors import FrontError, ScanTrussError
+    from ..errors import ScanTrussError
     from ..grid.certificate import Certificate
     from ..scan.cloud import PointCloud
     from ..settings import Settings
@@ -228,7 +228,7 @@ def attempts(cloud: PointCloud, settings: Settings, rows: Sequence[AttemptRow] =
     scan, now = AskedScan(cloud, settings), settings
     made: list[tuple[Settings, Starts]] = []
     for row in rows:
-        if not row.when(scan, now):
+        if not _applies(row, scan, now):
             continue
         tried = row.changed(now)
         for starts in row.layouts(tried):
@@ -236,6 +236,14 @@ def attempts(cloud: PointCloud, settings: Settings, rows: Sequence[AttemptRow] =
                 made.append((tried, starts))
                 yield Attempt(tried, starts, row=row.name)
         now = tried if row.stays else now
+
+
+def _applies(row: AttemptRow, scan: AskedScan, now: Settings) -> bool:
+    """Whether a row is made; not where the look that tells fails as the attempts did, as at a boundary that cannot be followed."""
+    try:
+        return row.when(scan, now)
+    except FrontError:
+        return False
 
 
 def layouts_of(settings: Settings) -> list[Starts]:

@@ -16,6 +16,9 @@ from ..surface.scratch import with_own_scratch
 from .curves import length_around
 
 NO_FREE_DIRECTION = 9.0  # stands for no free direction
+FEWEST_TOUCHES = (
+    500  # touches that are expected however few samples are at the edge: one caught disc may be tried again many times
+)
 MOST_TOUCHES = 200.0  # times that the disc may touch each sample at the edge, on average
 ROUND_AND_ROUND = "the boundary cannot be followed: the scan is too rough or too sparse for this length; use another, or clean the scan"
 MOST_TRIES = 20  # attempts to roll the disc away from one place
@@ -67,10 +70,10 @@ class _RollingDisc:
 
     def __init__(self, surface: Surface, radii: np.ndarray, free: int, origin: np.ndarray) -> None:
         count = len(surface.mean)
-        self.origin, self.watch = origin, Watch(ROUND_AND_ROUND, free, MOST_TOUCHES)
+        self.origin, self.watch = origin, Watch(ROUND_AND_ROUND, FEWEST_TOUCHES + free, MOST_TOUCHES)
         self.surface, self.radii = surface, radii
         self.mirrored = surface._replace(normals=-surface.normals)
-        self.path = np.empty(2_000 + 4 * free, np.int64)
+        self.path = np.empty(4 * (FEWEST_TOUCHES + free), np.int64)
         self.following, self.preceding, self.visit = (np.full(count, -1, np.int64) for _ in range(3))
         self.banned = np.zeros(count, np.bool_)
 
