@@ -25,7 +25,7 @@ POINTS_OF_EMPTY_BAY = 6.0  # a corner in a bay where no more points than this ar
 # a bay in a straight boundary is closed if no more points than this are expected in it, and none of its sides goes on into it
 POINTS_OF_RANDOM_BAY = 10.0
 WIDEST_BAY = 0.8  # widest mouth of such a bay [member lengths]
-LEAST_BAY = 0.02  # least area of such a bay [square of the member length]
+LEAST_BAY = 0.05  # least area of such a bay [square of the member length]
 LONGEST_BAY, LENGTHENED = 2.0, 1.2  # longest way around it [member lengths], and least [its mouth]
 # lengths of the curve beside it that are its sides [member lengths], and the least cosine of their angles with the mouth
 SIDES_OF_BAY, COSINE_OF_SIDE = (0.2, 0.6), 0.92
@@ -109,22 +109,23 @@ def close_random_bays(curve: np.ndarray, density: float, length: float, surface:
     A disc that slides along points drawn at random falls into a gap between them and far into the surface, and the bay looks like a
     corner. density : points per area [1 / scan unit^2]
     """
-    step = CURVE_STEP * length
-    for _ in range(len(curve)):  # each bay that is closed takes away places
-        begin, places = _largest_bay(curve, outward(surface, curve), density, length)
-        if places == 0:
+    for _ in range(len(curve)):  # each turn takes away places
+        bays = _random_bays(curve, outward(surface, curve), density, length)
+        if not bays:
             break
-        curve = np.roll(curve, -begin, axis=0)
-        curve = resample(np.concatenate([curve[:1], curve[places:]]), step)
+        kept = np.ones(len(curve), np.bool_)
+        for begin, places in bays:
+            kept[np.arange(begin + 1, begin + places) % len(curve)] = False
+        curve = resample(curve[kept], CURVE_STEP * length)
     return curve
 
 
-def _largest_bay(curve: np.ndarray, out: np.ndarray, density: float, length: float) -> tuple[int, int]:
-    """Return where the largest bay begins that random sampling explains, and how many steps it takes; (0, 0) if there is none."""
-    best, found = LEAST_BAY * length**2, (0, 0)
+def _random_bays(curve: np.ndarray, out: np.ndarray, density: float, length: float) -> list[tuple[int, int]]:
+    """Return where each bay begins that random sampling explains, and how many steps it takes; of those that overlap the largest."""
     sides = [round(side / CURVE_STEP) for side in SIDES_OF_BAY]
     before = [_unit(curve - np.roll(curve, side, axis=0)) for side in sides]
     after = [np.roll(ahead, -side, axis=0) for ahead, side in zip(before, sides, strict=True)]
+    bays: list[tuple[float, int, int]] = []
     for places in range(4, min(round(LONGEST_BAY / CURVE_STEP), len(curve) // 4) + 1):
         chord = np.roll(curve, -places, axis=0) - curve
         mouth, ahead = np.linalg.norm(chord, axis=1), _unit(chord)
@@ -132,12 +133,15 @@ def _largest_bay(curve: np.ndarray, out: np.ndarray, density: float, length: flo
         goes_on = np.min(beside, axis=0) > COSINE_OF_SIDE
         lengthened = places * CURVE_STEP * length > LENGTHENED * mouth
         at = np.flatnonzero(goes_on & lengthened & (mouth < WIDEST_BAY * length))
-        if len(at):
-            area = _area_to_chord(curve, at, places, out)
-            area[area * density > POINTS_OF_RANDOM_BAY] = 0.0
-            k = int(area.argmax())
-            if area[k] > best:
-                best, found = float(area[k]), (int(at[k]), places)
+        area = _area_to_chord(curve, at, places, out)
+        random = (area > LEAST_BAY * length**2) & (area * density <= POINTS_OF_RANDOM_BAY)
+        bays += [(-size, begin, places) for size, begin in zip(area[random].tolist(), at[random].tolist(), strict=True)]
+    taken, found = np.zeros(len(curve), np.bool_), []
+    for _, begin, places in sorted(bays):
+        inside = np.arange(begin, begin + places + 1) % len(curve)
+        if not taken[inside].any():
+            taken[inside] = True
+            found.append((begin, places))
     return found
 
 
