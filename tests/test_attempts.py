@@ -16,6 +16,7 @@ from scantruss.attempts.course import RIDGES_GIVEN_UP, WITHOUT_RODS, AttemptCour
 from scantruss.attempts.limit import MOST_RUNS
 from scantruss.attempts.table import AS_ASKED, ROWS_TRIED, TURNED_ROWS, Attempt, AttemptRow, attempts
 from scantruss.errors import FrontError
+from scantruss.surface import samples
 
 NAMES = [row.name for row in ROWS_TRIED]
 
@@ -131,6 +132,26 @@ def test_where_none_passes_the_list_is_made_again_with_the_least_effort_and_ends
     assert made == once + [replace(each, settings=each.settings.replace(effort="quick")) for each in once]
     with pytest.raises(FrontError, match=r"fault 1$"):
         course.outcome()
+
+
+def test_the_samples_of_all_looks_at_a_scan_of_a_hundred_thousand_points_are_made_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    cloud, asked = st.PointCloud.from_array(CLOUDS["rough"][0]), st.Settings(length=1.0)
+    kept = samples.POINTS_OF_KEPT_SAMPLES * len(cloud.points) // 100_000
+    made: list[Any] = []
+    monkeypatch.setattr(samples, "POINTS_OF_KEPT_SAMPLES", kept)
+    made_of = samples._prepare
+
+    def prepare(*given: Any, **more: Any) -> samples.SurfaceSamples:
+        made.append(given[3])
+        return made_of(*given, **more)
+
+    monkeypatch.setattr(samples, "_prepare", prepare)
+    for attempt in (course := AttemptCourse(cloud, asked)):
+        samples.sample_surface(cloud, attempt.settings)
+        course.failed(attempt, FrontError("fault"))
+    assert len(made) == len(set(made)) > 5
 
 
 def test_a_grid_along_rods_is_followed_by_one_attempt_without_and_the_better_is_taken(

@@ -10,7 +10,7 @@ from typed import known
 
 import scantruss as st
 from scantruss.check.certify import certified, certify
-from scantruss.check.hanging import nodes_off_sheets
+from scantruss.check.hanging import any_stands_off, nodes_off_sheets
 from scantruss.errors import CertificateError
 
 SETTINGS = st.Settings(length=1.0, ridge_angle=0.0)
@@ -47,6 +47,7 @@ def test_a_node_at_the_foot_of_a_column_is_a_fault_though_points_are_near_its_me
     (fault,) = (fault for fault in faults if fault.kind == "hanging")
     assert known(fault.where) == pytest.approx((0.0, 0.0, -0.8), abs=1e-9)
     assert not any(fault.kind == "hanging" for fault in certify(grid, samples, NOTHING, SETTINGS).faults)
+    assert any_stands_off(grid.replace(nodes=nodes), samples, 1.0) and not any_stands_off(grid, samples, 1.0)
 
 
 def test_a_node_some_way_down_a_column_is_a_fault_too_but_none_on_a_bent_sheet() -> None:
@@ -120,7 +121,7 @@ def test_a_node_up_or_down_the_mast_of_a_peak_is_a_fault_and_one_on_the_peak_is_
     nodes[np.linalg.norm(grid.nodes, axis=1).argmin(), 2] = tip
     samples, grid = scanned(np.concatenate([points, mast(0.09, -1.0, 2.9 if hole else 2.4)]), grid.replace(nodes=nodes))
     found = nodes_off_sheets(grid, samples, 1.0)
-    assert bool(found) == fails
+    assert bool(found) == fails == any_stands_off(grid, samples, 1.0)
     if fails:
         assert known(found[0].where) == pytest.approx((0.0, 0.0, tip), abs=1e-9)
 

@@ -19,13 +19,14 @@ from scantruss.check.boundaries import boundary_beyond, boundary_left, places_as
 from scantruss.check.certify import certify
 from scantruss.check.distances import measure_distances
 from scantruss.check.doubtful import doubtful_places, zigzags
-from scantruss.check.gaps import bridged_gaps, by_x, is_empty_within
+from scantruss.check.gaps import bridged_gaps, is_empty_within
 from scantruss.check.limits import places_to_look_at
 from scantruss.check.openings import boundary_overrun
 from scantruss.check.refusal import passed_grid
 from scantruss.errors import CertificateError
 from scantruss.grid.certificate import Certificate, Fault, LeftOut
 from scantruss.report.figures import left_out_lines
+from scantruss.scan.cloud import by_x
 from scantruss.surface.chosen_samples import OUTLIER
 from scantruss.surface.samples import sample_surface
 

@@ -350,6 +350,13 @@ def test_samples_are_kept_as_long_as_their_cloud_and_the_length_stay() -> None:
     assert sample_surface(PointCloud.from_array(sheet(4, 3, 0.25)), Settings(length=1.0)) is not first
 
 
+def test_the_points_of_samples_are_sorted_once() -> None:
+    samples = samples_of(np.random.default_rng(0).permutation(sheet(4, 3, 0.25)))
+    ordered = samples.points_by_x
+    assert (np.diff(ordered[:, 0]) >= 0.0).all() and samples.points_by_x is ordered
+    assert (np.sort(ordered, axis=0) == np.sort(samples.measured_points, axis=0)).all()
+
+
 @pytest.mark.kernels
 def test_same_cloud_same_bytes() -> None:
     a, b = (samples_of(cap(3.0, 1.0, 0.3)) for _ in range(2))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -139,6 +140,35 @@ def test_a_tip_that_spoils_the_grid_is_given_up_and_the_others_are_reached(monke
     nodes = grid.nodes
     reached = [np.linalg.norm(nodes - tip, axis=1).min() < 0.5 for tip in tips]
     assert any(reached[1:])
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_a_tip_alone_whose_node_stands_off_the_scan_is_given_up_before_anything_is_measured(
+    count: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    mesh = SimpleNamespace(copied=lambda: None, restore=lambda _: None, length=1.0)
+    search = tip_search.TipSearch(
+        cast(Any, SimpleNamespace(mesh=mesh)), *cast(Any, (SimpleNamespace(origin=np.zeros(3)), 0, 0, 0))
+    )
+    failed = SimpleNamespace(certificate=SimpleNamespace(faults=[]), checked_grid=None)
+    asked: list[str] = []
+
+    def noted(name: str, found: Any) -> Any:
+        def note(*_: Any) -> Any:
+            asked.append(name)
+            return found
+
+        return note
+
+    monkeypatch.setattr(tip_search, "put_on_tips", lambda *_: True)
+    monkeypatch.setattr(tip_search, "put_down", lambda *_: None)
+    monkeypatch.setattr(tip_search, "misses_at_most", lambda *_: False)
+    monkeypatch.setattr(tip_search.TipSearch, "of_scan", ())
+    monkeypatch.setattr(tip_search.TipSearch, "judged", noted("all", failed))
+    monkeypatch.setattr(tip_search.TipSearch, "stands_off", noted("off", True))
+    tips = [np.full(3, 9.0 * number) for number in range(count)]
+    assert search.reach(tips) is None and len(search.given_up) == count
+    assert asked == ["all"] * (count > 1) + ["off"] * count
 
 
 @compiled_only

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..grid.certificate import Fault, place_of
 from ..surface.chosen_samples import LIMB, SLIT
-from .gaps import by_x, points_within
+from .gaps import points_within
 from .hanging import axes_of_nodes
 from .limits import NOISES_OFF, PLACES_KEPT
 
@@ -112,7 +112,7 @@ def _stands_on_sheet(
     stands = np.zeros(len(nodes), np.bool_)
     pointed = np.linalg.norm(axes, axis=1)
     sharp = np.flatnonzero(pointed > SPIKE)
-    points = by_x(samples.measured_points) if len(sharp) else samples.measured_points
+    points = samples.points_by_x
     for number in sharp.tolist():
         apart = np.linalg.norm(grid.nodes[nodes] - grid.nodes[nodes[number]], axis=1)
         if (apart < BESIDE_SPIKE * length).sum() > MOST_SPIKES:

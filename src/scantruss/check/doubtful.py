@@ -8,8 +8,9 @@ import numpy as np
 
 from ..grid.certificate import Fault, place_of
 from ..kernels.geometry.components import component_labels
+from ..scan.cloud import by_x
 from ..surface.chosen_samples import DUPLICATE, KEPT
-from .gaps import PLACES_ACROSS_GAP, by_x, is_empty_within
+from .gaps import PLACES_ACROSS_GAP, is_empty_within
 from .limits import PLACES_KEPT
 
 if TYPE_CHECKING:

@@ -71,7 +71,7 @@ def _gaps_within(
     times its area, tells the density there: n points around an empty disc mean that it would hold n / 3. Discs lie in the planes of
     the triangles, so that a triangle off a bent surface is none over a gap.
     """
-    points = samples.measured_points
+    points = samples.points_by_x
     places, owner = _places(grid)
     away = nearest_point_distances(places, samples, length)
     members = np.full(len(grid.nodes), length) if grid.desired is None else grid.desired
@@ -79,9 +79,9 @@ def _gaps_within(
     least = HALF_WIDTH * members
     if not (away > (least - NEAR_MIDDLE * members)[owner]).any():
         return [], []
-    ordered, normals = by_x(points), _normals(grid)
+    normals = _normals(grid)
     some = np.arange(0, len(places), len(places) // SOME_PLACES + 1)
-    usual = np.median([_level(places[at], normals[owner[at]], away[at], ordered).min(initial=away[at]) for at in some])
+    usual = np.median([_level(places[at], normals[owner[at]], away[at], points).min(initial=away[at]) for at in some])
     least = np.maximum(least, FAR_OF_USUAL * usual)
     covering = np.unique(owner[away > (least - NEAR_MIDDLE * members)[owner]])
     extra, theirs = _more_places(grid, covering)
@@ -91,7 +91,7 @@ def _gaps_within(
     needed = np.repeat([POINTS_AROUND, POINTS_AROUND_MIDDLE], [len(places), len(best)])
     places, owner = np.concatenate([places, extra[best]]), np.concatenate([owner, theirs[best]])
     away = np.concatenate([away, from_extra[best]])
-    points, least = ordered, least[owner]
+    least = least[owner]
     far = np.flatnonzero(away > least)
     far = far[np.argsort(-away[far], kind="stable")[:GAPS_LOOKED_AT]]
     half = np.array([empty_disc(places[at], normals[owner[at]], away[at], points, needed[at]) for at in far])
@@ -162,12 +162,6 @@ def openings_closed(
 def _has_points_within(points: np.ndarray, place: np.ndarray, reach: float | None) -> bool:
     """Whether any of the points (N, 3) lies within reach of a place (3,)."""
     return bool((((points - place) ** 2).sum(axis=1) <= (reach or 0.0) ** 2).any())
-
-
-def by_x(points: np.ndarray) -> np.ndarray:
-    """Return points (N, 3) by ascending x."""
-    ordered: np.ndarray = points[np.argsort(points[:, 0], kind="stable")]
-    return ordered
 
 
 def is_empty_within(curve: np.ndarray, points: np.ndarray, edge: np.ndarray | None = None) -> bool:

@@ -10,7 +10,7 @@ import numpy as np
 
 from ..grid.certificate import Fault, place_of
 from .distances import nearest_point_distances, normals_at_nodes
-from .gaps import by_x, points_within
+from .gaps import points_within
 from .limits import PLACES_KEPT
 
 if TYPE_CHECKING:
@@ -63,14 +63,28 @@ def nodes_off_sheets(grid: Grid, samples: SurfaceSamples, length: float) -> list
 
     Parameters as of `hanging_nodes`.
     """
+    return _fault(
+        "off sheet", "has a node on points that stand off the sheet around it", grid, _off(grid, samples, length)[1]
+    )
+
+
+def any_stands_off(grid: Grid, samples: SurfaceSamples, length: float) -> bool:
+    """Whether a node hangs on points or stands off a sheet, as far as its members tell, without distances between grid and scan.
+
+    Then the grid has a fault of `hanging_nodes` or of `nodes_off_sheets`; parameters as of these.
+    """
+    return any(len(nodes) for nodes in _off(grid, samples, length))
+
+
+def _off(grid: Grid, samples: SurfaceSamples, length: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return the nodes that are spikes steep enough to hang (K,), and the others that stand off an even sheet or on a mast (L,)."""
     desired = np.full(len(grid.nodes), length) if grid.desired is None else grid.desired
     hanging = _spikes(grid, samples, desired, STEEP_MEMBER_SINE, EVEN_COSINE)
     standing = np.union1d(
         _spikes(grid, samples, desired, LESS_STEEP_MEMBER_SINE, EVEN_FLAT_COSINE), _on_masts(grid, samples, desired)
     )
     # the lip of a thin body is no mast: all members leave it
-    nodes = np.setdiff1d(standing, np.union1d(hanging, grid.lines))
-    return _fault("off sheet", "has a node on points that stand off the sheet around it", grid, nodes)
+    return hanging, np.setdiff1d(standing, np.union1d(hanging, grid.lines))
 
 
 def _fault(kind: str, words: str, grid: Grid, nodes: np.ndarray) -> list[Fault]:
@@ -97,7 +111,7 @@ def _far_off(grid: Grid, samples: SurfaceSamples, found: Distances, desired: np.
     which = np.flatnonzero(doubted & hanging[grid.edges].any(axis=1))
     if not len(which):
         return which
-    points = by_x(samples.measured_points)
+    points = samples.points_by_x
     normals = {
         node: _normal(grid.nodes[node], AROUND_END * desired[node], points) for node in set(grid.edges[which].flat)
     }
@@ -156,7 +170,7 @@ def _spikes(grid: Grid, samples: SurfaceSamples, desired: np.ndarray, steep: flo
     tips = _pointed_nodes(grid, samples, desired, steep)
     if not len(tips.node):
         return tips.node
-    points = by_x(samples.measured_points)
+    points = samples.points_by_x
     found, of = np.unique(tips.foot, return_inverse=True)
     normals = np.array([_normal(grid.nodes[k], AROUND_END * desired[k], points) for k in found]).reshape(-1, 3)[of]
     axes = tips.axes[tips.node]
@@ -171,7 +185,7 @@ def _on_masts(grid: Grid, samples: SurfaceSamples, desired: np.ndarray) -> np.nd
     nodes = tips.mostly(np.ones(len(tips.node), np.bool_))
     if not len(nodes):
         return nodes
-    points, normals = by_x(samples.measured_points), normals_at_nodes(grid)
+    points, normals = samples.points_by_x, normals_at_nodes(grid)
     off = [_is_off_along(grid.nodes[node], normals[node], desired[node], points) for node in nodes]
     return nodes[np.array(off)]
 

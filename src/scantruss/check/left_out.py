@@ -14,7 +14,7 @@ from ..kernels.mesh.coverage import nearest_distances
 from ..surface.chosen_samples import DUPLICATE, KEPT, LIMB, OUTLIER, ROD, SLIT, SPARSE_POINT
 from ..surface.owners import owners_of
 from .distances import boxes_of
-from .gaps import by_x, is_empty_within, points_of_loops
+from .gaps import is_empty_within, points_of_loops
 
 if TYPE_CHECKING:
     from ..boundary.find import Boundary
@@ -184,9 +184,9 @@ def closed_holes(samples: SurfaceSamples, boundary: Boundary) -> list[LeftOut]:
     filled = [samples.surface.mean[made_up[group == each]] for each in np.unique(group)]
     filled = [places for places in filled if not _closes_body(places, samples)]
     holes = [_hole(places, samples, asked=True) for places in filled]
-    points = by_x(samples.measured_points) if boundary.bridged else samples.measured_points
     edge = points_of_loops(boundary)
-    holes += [_hole(curve, samples, asked=False) for curve in boundary.bridged if is_empty_within(curve, points, edge)]
+    open_ones = (curve for curve in boundary.bridged if is_empty_within(curve, samples.points_by_x, edge))
+    holes += [_hole(curve, samples, asked=False) for curve in open_ones]
     holes = without_caps(holes, samples)
     return first_and_more(sorted(holes, key=lambda hole: -(hole.size or 0.0)))
 

@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..check.hanging import any_stands_off
 from .candidate import Candidate, grid_of, judged, misses_at_most
 from .optimize import put_down, searched_again
+from .rings import finish_rings
 from .tips import find_tips, put_on_tips, suspects_apart
 
 if TYPE_CHECKING:
@@ -66,6 +68,10 @@ class TipSearch:
         """Return a grid that was put down, judged."""
         return judged(grid, self.samples, self.boundary, self.settings)
 
+    def stands_off(self, grid: Grid) -> bool:
+        """Whether a grid that was put down fails as a node stands off the scan, which is known long before all else."""
+        return any_stands_off(finish_rings(grid, self.boundary), self.samples, self.settings.length)
+
     def reach(self, tips: Sequence[np.ndarray]) -> Judged | None:
         """Put nodes on the tips (3,) where nothing goes wrong, and give up the others; the grid then, None where it is as before.
 
@@ -74,11 +80,13 @@ class TipSearch:
         mesh = self.candidate.mesh
         kept = mesh.copied()
         if put_on_tips(mesh, tips):
-            now = self.judged(put_down(mesh, *self.of_scan))
-            if misses_at_most(now.checked_grid, MOST_MISSED):
+            grid = put_down(mesh, *self.of_scan)
+            # of a tip alone nobody asks what else is wrong
+            now = None if len(tips) == 1 and self.stands_off(grid) else self.judged(grid)
+            if now is not None and misses_at_most(now.checked_grid, MOST_MISSED):
                 return now
             mesh.restore(kept)
-            if len(tips) > 1:
+            if now is not None and len(tips) > 1:
                 faults = [np.array(each.where) - self.samples.origin for each in now.certificate.faults if each.where]
                 harmless, suspects = suspects_apart(tips, faults, mesh.length)
                 found = self.reach(harmless)

@@ -197,6 +197,12 @@ def _drop_not_finite(array: np.ndarray, prefix: str) -> tuple[np.ndarray, np.nda
     return array, lower, upper
 
 
+def by_x(points: np.ndarray) -> np.ndarray:
+    """Return points (N, 3) by ascending x."""
+    ordered: np.ndarray = points[np.argsort(points[:, 0], kind="stable")]
+    return ordered
+
+
 def bounds_of(array: np.ndarray) -> Bounds:
     """Return the smallest and largest coordinates, (3,) each; NaN if one is NaN or infinite."""
     if not len(array):

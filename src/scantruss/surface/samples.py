@@ -14,7 +14,7 @@ from ..kernels.surface.local_surface import Surface
 from ..runtime.parallel import in_parts
 from ..scan.clean.duplicates import find_repeated, has_repeats
 from ..scan.clean.streamline import points_near
-from ..scan.cloud import WITHOUT_COORDINATES, Bounds, PointCloud, bounds_of
+from ..scan.cloud import WITHOUT_COORDINATES, Bounds, PointCloud, bounds_of, by_x
 from ..scan.normals import mean_normals
 from ..settings import SAMPLE_SPACING, SMOOTH_SAMPLE_SPACING, Settings
 from .body import opened_body
@@ -46,9 +46,9 @@ from .thin_walls import normals_of_walls
 BESIDE_SAMPLES = 1.5  # distance from points of the boundary within which all points are used [`sample_spacing`]
 UNCLEANED_DISTANCE = 3.0  # as `Settings.outlier_distance`, where a scan is not cleaned
 BROAD_PASSES = 4  # times that normals are averaged with those beside them for the sheet as a whole
-POINTS_OF_KEPT_SAMPLES = (
-    500_000  # points of a cloud with which samples of several settings are kept, that often; else the last ones
-)
+# points of a cloud with which samples of several settings are kept, that often, as the looks at a scan ask for a dozen and more and each
+# effort for all of them again; of larger clouds the last ones; they take about 100 bytes a point
+POINTS_OF_KEPT_SAMPLES = 1_500_000
 PATCH_POINTS_TO_PROJECT = 24.0  # most points per sample to which a patch is fitted when nodes are projected
 
 
@@ -109,6 +109,11 @@ class SurfaceSamples:
         """The points that were read and kept, without outliers and duplicates (M, 3) [scan unit]."""
         kept = self.judged == KEPT
         return self.scan if kept.all() else np.ascontiguousarray(self.scan[kept])
+
+    @cached_property
+    def points_by_x(self) -> np.ndarray:
+        """The measured points (M, 3) by ascending x, among which those near a place are found at once [scan unit]."""
+        return by_x(self.measured_points)
 
     @cached_property
     def points_of_surface(self) -> np.ndarray:
