@@ -211,11 +211,12 @@ def test_what_bends_evenly_is_even() -> None:
 @pytest.mark.parametrize(
     ("members", "bend", "gain", "is_clear"),
     [
-        (7.0, 50.0, 2.0, True),
-        (7.0, 50.0, 0.5, False),
+        (13.0, 50.0, 2.0, True),
+        (11.0, 50.0, 2.0, False),
+        (13.0, 50.0, 0.5, False),
         (7.0, 60.0, 0.5, True),
-        (7.0, 30.0, 2.0, False),
-        (5.0, 50.0, 2.0, False),
+        (13.0, 30.0, 2.0, False),
+        (5.0, 60.0, 2.0, False),
     ],
 )
 def test_among_places_that_only_look_folded_a_long_sure_line_is_a_ridge(

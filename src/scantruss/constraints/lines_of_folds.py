@@ -11,7 +11,10 @@ LONG_FULL = 2.5  # length of a ridge with the full angle that is enough, whateve
 GAIN_OF_SURE = 90.0  # median gain of a line of folds that is sure, at least
 GAIN_OF_MADE, LEAST_MADE = 1200.0, 4.0  # the same of one that was made, and its length [member lengths]
 LEAST_ROUGH_RIDGE = 6.0  # least length of a line of folds on a rough scan [member lengths]
-ROUGH_SHARE = 1.4  # share of the ridge angle by which half of such a line is folded at least, where it is not sure
+ROUGH_SHARE = (
+    1.4  # share of the ridge angle by which half of such a line is folded at least, where it is not sure and longer
+)
+LEAST_SURE_ROUGH = 12.0  # least length of a sure line there that is folded by less [member lengths]
 TURNS_BACK = np.radians(125.0)  # bend of a wide fold from which on it is a lip
 PLACES_OF_TURN = 3  # places on both sides from which the turn of a line is taken
 CORNER_TURN = 25.0  # by how much a line turns more in a corner than before and after it [degree]
@@ -89,9 +92,11 @@ def parts_of_fold(folds: np.ndarray) -> list[np.ndarray]:
 
 
 def is_clear_on_rough(folds: np.ndarray, angle: float) -> bool:
-    """Whether an even line of folds (K,) FOLD is so long, and so sharp or sure, that it is a ridge where many other places look folded."""
-    is_clear = is_sure(folds, angle) or bool(np.median(folds["bend"]) >= ROUGH_SHARE * angle)
-    return len(folds) * FOLD_STRIDE >= LEAST_ROUGH_RIDGE and is_clear
+    """Whether an even line of folds (K,) FOLD is so long, sharp or sure that it is a ridge where many other places look folded."""
+    long = len(folds) * FOLD_STRIDE
+    if float(np.median(folds["bend"])) >= ROUGH_SHARE * angle:
+        return long >= LEAST_ROUGH_RIDGE
+    return long >= LEAST_SURE_ROUGH and is_sure(folds, angle)
 
 
 def is_even(folds: np.ndarray, angle: float, sharpest: float = SHARPEST_FOLD_ANGLE, slack: float = 0.0) -> bool:
