@@ -26,8 +26,9 @@ LEFT_OUT = 0.2  # share of the sheets that a grid may leave out
 MEMBERS_APART_TORN = 4  # members between two nodes from which on neighbouring parts of the scan are torn apart
 FEWEST_LINKS = 3  # fewest links between such parts that are no accident
 MOST_LINKS = 1000  # most that are looked at
-# farthest that the middle of a link lies from the scan, at least: it spans a slit else [member lengths, spacings of the points]
-MIDDLE_OFF, SPACINGS_OFF = 0.25, 2.0
+# farthest that the middle of a link lies from the scan, at least, and least cosine between the normals at its ends: else it spans a slit
+# between parts that only face each other [member lengths, spacings of the points]
+MIDDLE_OFF, SPACINGS_OFF, FACES_ALIKE = 0.25, 2.0, 0.5
 # gap between points of one side of a break, and distance from it of those beside it [member lengths]
 BESIDE_BREAK = 0.25
 SPACINGS_BESIDE_BREAK = 1.5  # ... and in spacings of the points
@@ -110,7 +111,8 @@ def disconnected_place(grid: Grid, samples: SurfaceSamples, nearest: np.ndarray,
     """Return a place (3,) where the grid is torn though the scan is whole; None where there is none.
 
     Each node has a part of the scan, the samples nearest to it. Where two parts meet, their nodes must be near each other in the grid:
-    joined by fewer than `MEMBERS_APART_TORN` members one after the other. Parts on both sides of a slit may be linked, and do not meet.
+    joined by fewer than `MEMBERS_APART_TORN` members one after the other. Parts on both sides of a slit that
+    face different ways may be linked, and do not meet.
 
     Parameters
     ----------
@@ -127,7 +129,8 @@ def disconnected_place(grid: Grid, samples: SurfaceSamples, nearest: np.ndarray,
     found = note_disconnected(surface.neighbors, surface.normals, nearest, first, ends, near, torn)
     off, apart = max(MIDDLE_OFF * length, SPACINGS_OFF * samples.spacing), list[int]()
     for one, two in torn[:found].tolist():
-        if distance_from_scan(surface, 0.5 * (surface.mean[one] + surface.mean[two])) <= off:
+        alike = surface.normals[one] @ surface.normals[two] > FACES_ALIKE
+        if alike or distance_from_scan(surface, 0.5 * (surface.mean[one] + surface.mean[two])) <= off:
             apart.append(one)
         if len(apart) == FEWEST_LINKS:
             return np.asarray(surface.mean[apart[0]])
