@@ -22,7 +22,7 @@ POINTS_OF_CLOSED_BAY = 4.0
 ROOM_ACROSS = 0.6  # distance to another part of the curve below which the offset is limited [member lengths]
 OFFSET_SHARE = 0.25  # largest offset towards another part of the curve, as a share of the distance to it
 POINTS_OF_EMPTY_BAY = 6.0  # a corner in a bay where no more points than this are expected does not count
-# a bay in a straight boundary is closed if no more points than this are expected in it, and none of its sides goes on into it
+# a bay beside which the boundary goes straight on is closed if no more points than this are expected in it
 POINTS_OF_RANDOM_BAY = 10.0
 WIDEST_BAY = 0.8  # widest mouth of such a bay [member lengths]
 LEAST_BAY = 0.05  # least area of such a bay [square of the member length]

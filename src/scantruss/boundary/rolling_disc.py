@@ -16,9 +16,8 @@ from ..surface.scratch import with_own_scratch
 from .curves import length_around
 
 NO_FREE_DIRECTION = 9.0  # stands for no free direction
-FEWEST_TOUCHES = (
-    500  # touches that are expected however few samples are at the edge: one caught disc may be tried again many times
-)
+# touches that are expected however few samples are at the edge: a disc that is caught may be tried again many times
+FEWEST_TOUCHES = 500
 MOST_TOUCHES = 200.0  # times that the disc may touch each sample at the edge, on average
 ROUND_AND_ROUND = "the boundary cannot be followed: the scan is too rough or too sparse for this length; use another, or clean the scan"
 MOST_TRIES = 20  # attempts to roll the disc away from one place
