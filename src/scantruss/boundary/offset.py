@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..kernels.surface.local_surface import Surface
-from ..scan.vectors import dots
+from ..scan.vectors import dots, units
 from ..settings import Settings
 from .corners import CURVE_STEP, find_corners
 from .curves import heights_along, outward, resample, room_across, runs_around, smooth_between
@@ -123,12 +123,12 @@ def close_random_bays(curve: np.ndarray, density: float, length: float, surface:
 def _random_bays(curve: np.ndarray, out: np.ndarray, density: float, length: float) -> list[tuple[int, int]]:
     """Return where each bay begins that random sampling explains, and how many steps it takes; of those that overlap the largest."""
     sides = [round(side / CURVE_STEP) for side in SIDES_OF_BAY]
-    before = [_unit(curve - np.roll(curve, side, axis=0)) for side in sides]
+    before = [units(curve - np.roll(curve, side, axis=0)) for side in sides]
     after = [np.roll(ahead, -side, axis=0) for ahead, side in zip(before, sides, strict=True)]
     bays: list[tuple[float, int, int]] = []
     for places in range(4, min(round(LONGEST_BAY / CURVE_STEP), len(curve) // 4) + 1):
         chord = np.roll(curve, -places, axis=0) - curve
-        mouth, ahead = np.linalg.norm(chord, axis=1), _unit(chord)
+        mouth, ahead = np.linalg.norm(chord, axis=1), units(chord)
         beside = [dots(side, ahead) for side in before + [np.roll(side, -places, axis=0) for side in after]]
         goes_on = np.min(beside, axis=0) > COSINE_OF_SIDE
         lengthened = places * CURVE_STEP * length > LENGTHENED * mouth
@@ -145,17 +145,11 @@ def _random_bays(curve: np.ndarray, out: np.ndarray, density: float, length: flo
     return found
 
 
-def _unit(vectors: np.ndarray) -> np.ndarray:
-    """Return vectors (M, 3) with length one."""
-    unit: np.ndarray = vectors / np.maximum(np.linalg.norm(vectors, axis=1), 1e-300)[:, None]
-    return unit
-
-
 def _area_to_chord(curve: np.ndarray, begin: np.ndarray, places: int, out: np.ndarray) -> np.ndarray:
     """Return the area (C,) between parts of a closed curve (M, 3) and their chords; negative where the curve lies outside its chord."""
     around = (begin[:, None] + np.arange(places + 1)) % len(curve)
     part = curve[around] - curve[around[:, :1]]
-    normal = _unit(np.cross(out[around].mean(axis=1), part[:, -1]))
+    normal = units(np.cross(out[around].mean(axis=1), part[:, -1]))
     area: np.ndarray = -0.5 * dots(np.cross(part[:, :-1], part[:, 1:]).sum(axis=1), normal)
     return area
 

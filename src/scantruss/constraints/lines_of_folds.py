@@ -11,9 +11,8 @@ LONG_FULL = 2.5  # length of a ridge with the full angle that is enough, whateve
 GAIN_OF_SURE = 90.0  # median gain of a line of folds that is sure, at least
 GAIN_OF_MADE, LEAST_MADE = 1200.0, 4.0  # the same of one that was made, and its length [member lengths]
 LEAST_ROUGH_RIDGE = 6.0  # least length of a line of folds on a rough scan [member lengths]
-ROUGH_SHARE = (
-    1.4  # share of the ridge angle by which half of such a line is folded at least, where it is not sure and longer
-)
+# share of the ridge angle by which half of such a line is folded at least, where it is not sure and longer
+ROUGH_SHARE = 1.4
 LEAST_SURE_ROUGH = 12.0  # least length of a sure line there that is folded by less [member lengths]
 TURNS_BACK = np.radians(125.0)  # bend of a wide fold from which on it is a lip
 PLACES_OF_TURN = 3  # places on both sides from which the turn of a line is taken
