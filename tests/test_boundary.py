@@ -12,7 +12,7 @@ from steps import boundary_of
 import scantruss as st
 from scantruss.boundary.curves import resample
 from scantruss.boundary.find import Loop, characteristic_points
-from scantruss.boundary.offset import close_random_bays
+from scantruss.boundary.offset import SamplingBias, close_random_bays
 from scantruss.boundary.touched_points import _onwards as onwards
 
 
@@ -366,7 +366,7 @@ def test_a_bay_is_closed_where_few_points_are_expected_in_it(name: str, density:
     corners = np.array([*last, [3, 3], [-3, 3], [-3, -3], *dents[name][::-1]], float)
     curve = resample(np.column_stack([corners, np.zeros(len(corners))]), 0.05)
     surface = samples_of(sheet(8, 8, 0.1)).surface
-    found = close_random_bays(curve, density, 1.0, surface)
+    found = close_random_bays(curve, SamplingBias(0.1, density), 1.0, surface)
     assert (len(found) < len(curve)) == closes
     if closes:
         assert found[np.abs(found[:, 0]) < 1.0, 1].min() < -2.9 and (np.abs(found[:, 1]) > 2.95).sum() > 200

@@ -140,7 +140,9 @@ def test_what_is_made_up_over_a_hole_leaves_the_rest_as_it_was_thinned() -> None
     filled = samples_with(samples, rough, settings)
     assert not filled.smooth and filled.sample_spacing == samples.sample_spacing
     rim = np.column_stack([np.full(80, 4.0), np.linspace(-4, 4, 80), np.zeros(80)]) - cloud.origin
-    taken = set(map(tuple, with_whole_boundary(filled, filled.surface, rim).points.tolist()))
+    all_points = with_whole_boundary(filled, filled.surface, rim).points
+    taken = set(map(tuple, all_points.tolist()))
+    assert len(taken) == len(all_points)  # none twice
     near = abs(cloud.points[:, 0] + cloud.origin[0] - 4.0) < samples.sample_spacing
     assert near.sum() > 500 and set(map(tuple, cloud.points[near].tolist())) <= taken
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 from scipy.spatial.distance import pdist
 from shapes import make
 from small_clouds import sheet
@@ -16,6 +17,7 @@ from scantruss.boundary import find
 from scantruss.boundary import offset as module
 from scantruss.boundary.corners import CURVE_STEP, find_corners
 from scantruss.boundary.curves import heights_along, outward, resample, room_across, runs_around
+from scantruss.boundary.density import density_along
 from scantruss.boundary.offset import NO_BIAS, SamplingBias
 from scantruss.cli.main import main
 from scantruss.kernels.surface.local_surface import Surface
@@ -47,8 +49,8 @@ def seen(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     """What `sampling_bias_of` is asked, and how far beyond it answers."""
     asked, full = [], module.sampling_bias_of
 
-    def spy(surface: Surface, points: np.ndarray, density: float, radius: float) -> Any:
-        found = full(surface, points, density, radius)
+    def spy(surface: Surface, points: np.ndarray, *rest: Any) -> Any:
+        found = full(surface, points, *rest)
         asked.append((points, found.beyond))
         return found
 
@@ -149,7 +151,7 @@ def test_a_step_that_leads_nowhere_has_endless_room_without_a_warning() -> None:
     steps = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [-1.0, 0.0, 0.0]])
     out = np.array([[1.0, 0.0, 0.0]] * 3)
     with np.errstate(all="raise"):
-        share = module.explained(steps, out, np.full(3, 1e12), density=0.1, inwards=2.0)
+        share = module.explained(steps, out, np.full(3, 1e12), np.full(3, 0.1), np.full(3, 2.0))
     assert share == pytest.approx([1.0, 1.0, 1.0])
 
 
@@ -265,3 +267,37 @@ def test_where_random_points_leave_the_corners_in_doubt_it_is_said_with_a_length
             assert 0.62 < float(found[1]) < 1.3
             assert main(["info", str(tmp_path / "a.npy"), "--length", "1.3", "--unit", "m"]) == 0
             assert "may be none" not in capsys.readouterr().err
+
+
+def scanned_from(corner: tuple[float, float], count: int, seed: int) -> np.ndarray:
+    """Points of a plate in the shape of an L, as many to an area as a scanner 3 m over a corner measures: fewer far away."""
+    rng = np.random.default_rng(seed)
+    points = rng.uniform((-10.0, -7.0), (10.0, 7.0), (20 * count, 2))
+    away = np.hypot(np.hypot(*(points - corner).T), 3.0)
+    is_there = ((points[:, 0] < 2.0) | (points[:, 1] < 1.0)) & (rng.random(len(points)) < (3.0 / away) ** 1.5)
+    return np.pad(points[is_there][:count], ((0, 0), (0, 1)))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_far_from_the_scanner_the_boundary_is_found_as_among_points_of_that_density(seed: int) -> None:
+    """Where there are ten times fewer points than near the scanner a narrow disc fell between them, up to a member deep."""
+    turns = np.array([(-10, -7), (10, -7), (10, 1), (2, 1), (2, 7), (-10, 7)], float)
+    loops, origin = boundary_of(scanned_from((-9.0, -5.0), 16_000, seed))
+    (loop,) = loops.loops
+    truth = resample(np.pad(turns, ((0, 0), (0, 1))), 0.01)
+    away = cKDTree(truth).query(loop.points + origin)[0]
+    assert np.sqrt(np.mean(away**2)) < 0.08 and away.max() < 0.4
+    assert cKDTree(loop.points + origin).query(np.pad(turns, ((0, 0), (0, 1))))[0].max() < 0.4
+
+
+@pytest.mark.kernels
+def test_points_beside_a_place_are_those_on_its_inner_side() -> None:
+    """On a plate with a point at each hundredth, as many as there are in half a disc; as the search of all points finds them."""
+    cloud = st.PointCloud.from_array(sheet(6, 6, 0.1))
+    surface = sample_surface(cloud, st.Settings(length=1.0)).surface
+    curve = circle(40, 2.0)
+    density = density_along(surface, curve, 0.7)
+    away = curve[:, None] - surface.points
+    inside = (np.linalg.norm(away, axis=2) < 0.7) & (np.einsum("mpc,mc->mp", away, outward(surface, curve)) > 0.0)
+    mean = inside.sum(axis=1).mean() / (0.5 * np.pi * 0.7**2)
+    assert density.mean() == pytest.approx(mean) and density == pytest.approx(np.full(40, 100.0), rel=0.1)

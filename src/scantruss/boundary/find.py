@@ -21,6 +21,7 @@ from ..surface.near_scan import distance_from_scan
 from ..surface.samples import SurfaceSamples, broad_normals, is_graded, samples_with
 from .corners import CURVE_STEP
 from .curves import cut_spikes, length_around, resample
+from .density import disc_beside
 from .given import cut_along
 from .holes import fill_holes
 from .offset import NO_BIAS, SamplingBias, offset_curve, sampling_bias_of
@@ -202,8 +203,9 @@ def _find_loops(samples: SurfaceSamples, settings: Settings) -> tuple[list[Loop]
     )
     loops = [loop for loop in rolled if loop.piece in samples.pieces]
     bridged = [surface.mean[loop.samples] for loop in short if loop.piece in samples.pieces]
-    disc = max(0.5 * radius, 2.5 * samples.spacing)
-    slid = boundary_points(samples, surface, [loop.samples for loop in loops], disc, CURVE_STEP * length)
+    paper = settings.method == "paper"
+    disc = disc_beside(samples, surface, radius, widens=not paper)
+    slid, whole = boundary_points(samples, surface, [loop.samples for loop in loops], disc, CURVE_STEP * length)
     for points, (loop, piece) in zip(slid, loops, strict=True):
         if len(points) < 3:
             continue
@@ -213,12 +215,11 @@ def _find_loops(samples: SurfaceSamples, settings: Settings) -> tuple[list[Loop]
         for width in SPIKE_LENGTHS:
             curve = cut_spikes(surface, curve, width * length, CURVE_STEP * length)
         if len(curve) >= 8:
-            paper = settings.method == "paper"
-            bias = NO_BIAS if paper else sampling_bias_of(surface, points, samples.density, disc)
+            bias = NO_BIAS if paper else sampling_bias_of(whole, points, curve, disc)
             found.append((curve, piece, bias))
     found = [each for each in found if not _at_ring(each[0], samples, length)]
     bridged = [curve for curve in bridged if not _at_ring(curve, samples, length)]
-    smoothed = [smooth_loop(*each, settings, surface) for each in found]
+    smoothed = [smooth_loop(*each, settings, whole) for each in found]
     bridged += [curve for (curve, _, _), loop in zip(found, smoothed, strict=True) if loop is None]
     return [loop for loop in smoothed if loop is not None], bridged
 

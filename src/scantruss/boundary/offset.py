@@ -11,6 +11,7 @@ from ..scan.vectors import dots, units
 from ..settings import Settings
 from .corners import CURVE_STEP, find_corners
 from .curves import heights_along, outward, resample, room_across, runs_around, smooth_between
+from .density import SlidingDisc, density_along
 
 SMOOTHING_WINDOW = 0.5  # half width of the window in which the curve is always smoothed [member lengths]
 # half widths of wider windows, used where random sampling explains how far they move the curve [member lengths]
@@ -48,23 +49,41 @@ class SamplingBias:
 
     beyond: float  #: mean distance from the boundary points to the edge of the surface [scan unit]
     density: float  #: points per area [1 / scan unit^2]
+    disc: SlidingDisc | None = None  #: that touched the points; None if they are as dense everywhere
+
+    def along(self, surface: Surface, curve: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return `beyond` and `density` at each place of a closed curve of equal steps (M, 3), both (M,)."""
+        if self.disc is None:
+            return np.full(len(curve), self.beyond), np.full(len(curve), self.density)
+        density = density_along(surface, curve, self.disc.reach)
+        mean = mean_beyond(self.density, self.disc)
+        return self.beyond / mean * mean_beyond(density, self.disc), density
 
 
 NO_BIAS = SamplingBias(0.0, np.inf)  # what method "paper" assumes
 
 
-def sampling_bias_of(surface: Surface, points: np.ndarray, density: float, radius: float) -> SamplingBias:
+def mean_beyond(density: np.ndarray | float, disc: SlidingDisc) -> np.ndarray:
+    """Return how far the surface extends on average beyond random points that a disc touches, by their density (M,) [scan unit].
+
+    For the density rho and a disc of radius r it is `MEAN_BEYOND` rho^(-2/3) r^(-1/3): the disc enters to the depth h at which the
+    segment inside the surface, of area (4/3) (2 r)^(1/2) h^(3/2), holds about one point.
+    """
+    found: np.ndarray = MEAN_BEYOND * np.asarray(density) ** (-2 / 3) * disc.radii(np.asarray(density)) ** (-1 / 3)
+    return found
+
+
+def sampling_bias_of(surface: Surface, points: np.ndarray, curve: np.ndarray, disc: SlidingDisc) -> SamplingBias:
     """Return how far the surface extends beyond its boundary points (M, 3), which a disc slid from outside touches.
 
-    For random points of density rho the mean is `MEAN_BEYOND` rho^(-2/3) r^(-1/3): the disc of radius r enters to the depth h at which
-    the segment inside the surface, of area (4/3) (2 r)^(1/2) h^(3/2), holds about one point. Points placed on the edge itself, as
-    in a mesh, hardly rise above the lines through their neighbours: then there is no bias.
+    Points placed on the edge itself, as in a mesh, hardly rise above the lines through their neighbours: then there is no bias.
+    curve : (K, 3) places of equal steps along the points
     """
-    of_random_points = MEAN_BEYOND * density ** (-2 / 3) * radius ** (-1 / 3)
+    density = float(np.median(density_along(surface, curve, disc.reach)))
+    of_random_points = float(mean_beyond(density, disc))
     uneven = float(np.median(np.abs(heights_along(surface, points)))) / of_random_points
-    return SamplingBias(
-        of_random_points * min(max((uneven - EXACT_ROUGHNESS) / (RANDOM_POINTS - EXACT_ROUGHNESS), 0.0), 1.0), density
-    )
+    random = min(max((uneven - EXACT_ROUGHNESS) / (RANDOM_POINTS - EXACT_ROUGHNESS), 0.0), 1.0)
+    return SamplingBias(of_random_points * random, density, disc)
 
 
 def offset_curve(
@@ -85,11 +104,12 @@ def offset_curve(
             curve, *find_corners(curve, settings), [round(SMOOTHING_WINDOW / CURVE_STEP)]
         )
         return narrow, corner_at
-    beyond, step = bias.beyond, CURVE_STEP * settings.length
-    curve = close_random_bays(curve, bias.density, settings.length, surface)
+    step = CURVE_STEP * settings.length
+    curve = close_random_bays(curve, bias, settings.length, surface)
+    beyond, density = bias.along(surface, curve)
     room = OFFSET_SHARE * room_across(curve, ROOM_ACROSS * settings.length, step)
     curve = curve + np.minimum(OFFSET_OF_BIAS * beyond, room)[:, None] * outward(surface, curve)
-    at, places = _corners(curve, bias, settings, surface)
+    at, places = _corners(curve, bias.beyond, density, settings, surface)
     halves = [
         round(SMOOTHING_WINDOW / CURVE_STEP),
         *(min(round(wide / CURVE_STEP), len(curve) // CURVE_PARTS) for wide in WIDER_WINDOWS),
@@ -97,20 +117,21 @@ def offset_curve(
     (narrow, *wider), corner_at = smooth_between(curve, at, places, halves)
     smoothed, out = narrow, outward(surface, wider[-1])
     room = OFFSET_SHARE * room_across(narrow, ROOM_ACROSS * settings.length, step)
+    beyond, density = bias.along(surface, narrow)
     for one in wider:
-        share = explained(one - narrow, out, room, bias.density * step, WINDOW_SHIFT * beyond)
+        share = explained(one - narrow, out, room, density * step, WINDOW_SHIFT * beyond)
         smoothed = smoothed + share[:, None] * (one - smoothed)
     return smoothed, corner_at
 
 
-def close_random_bays(curve: np.ndarray, density: float, length: float, surface: Surface) -> np.ndarray:
+def close_random_bays(curve: np.ndarray, bias: SamplingBias, length: float, surface: Surface) -> np.ndarray:
     """Return a closed curve (M, 3) of equal steps, the surface to its left, without the bays that random sampling makes in straight parts.
 
     A disc that slides along points drawn at random falls into a gap between them and far into the surface, and the bay looks like a
-    corner. density : points per area [1 / scan unit^2]
+    corner.
     """
     for _ in range(len(curve)):  # each turn takes away places
-        bays = _random_bays(curve, outward(surface, curve), density, length)
+        bays = _random_bays(curve, outward(surface, curve), bias.along(surface, curve)[1], length)
         if not bays:
             break
         kept = np.ones(len(curve), np.bool_)
@@ -120,7 +141,7 @@ def close_random_bays(curve: np.ndarray, density: float, length: float, surface:
     return curve
 
 
-def _random_bays(curve: np.ndarray, out: np.ndarray, density: float, length: float) -> list[tuple[int, int]]:
+def _random_bays(curve: np.ndarray, out: np.ndarray, density: np.ndarray, length: float) -> list[tuple[int, int]]:
     """Return where each bay begins that random sampling explains, and how many steps it takes; of those that overlap the largest."""
     sides = [round(side / CURVE_STEP) for side in SIDES_OF_BAY]
     before = [units(curve - np.roll(curve, side, axis=0)) for side in sides]
@@ -134,7 +155,7 @@ def _random_bays(curve: np.ndarray, out: np.ndarray, density: float, length: flo
         lengthened = places * CURVE_STEP * length > LENGTHENED * mouth
         at = np.flatnonzero(goes_on & lengthened & (mouth < WIDEST_BAY * length))
         area = _area_to_chord(curve, at, places, out)
-        random = (area > LEAST_BAY * length**2) & (area * density <= POINTS_OF_RANDOM_BAY)
+        random = (area > LEAST_BAY * length**2) & (area * density[at] <= POINTS_OF_RANDOM_BAY)
         bays += [(-size, begin, places) for size, begin in zip(area[random].tolist(), at[random].tolist(), strict=True)]
     taken, found = np.zeros(len(curve), np.bool_), []
     for _, begin, places in sorted(bays):
@@ -165,14 +186,14 @@ def length_that_shows_corners(beyond: float, length: float) -> float:
 
 
 def _corners(
-    curve: np.ndarray, bias: SamplingBias, settings: Settings, surface: Surface
+    curve: np.ndarray, beyond: float, density: np.ndarray, settings: Settings, surface: Surface
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return where a curve along random points has corners, and their places; not those in bays that random sampling explains."""
-    coarser = min(max(bias.beyond / (CORNERS_SHOW_TO * settings.length), 1.0), COARSEST_CORNERS)
+    coarser = min(max(beyond / (CORNERS_SHOW_TO * settings.length), 1.0), COARSEST_CORNERS)
     at, places = find_corners(curve, settings, coarser)
     if len(at) == 0:
         return at, places
-    kept = bays_at(curve, at, outward(surface, curve)) * bias.density > POINTS_OF_EMPTY_BAY
+    kept = bays_at(curve, at, outward(surface, curve)) * density[at] > POINTS_OF_EMPTY_BAY
     return at[kept], places[kept]
 
 
@@ -192,22 +213,24 @@ def bays_at(curve: np.ndarray, at: np.ndarray, out: np.ndarray) -> np.ndarray:
     return found
 
 
-def explained(step: np.ndarray, out: np.ndarray, room: np.ndarray, density: float, inwards: float) -> np.ndarray:
+def explained(
+    step: np.ndarray, out: np.ndarray, room: np.ndarray, density: np.ndarray, inwards: np.ndarray
+) -> np.ndarray:
     """Return the share (M,), 0 to 1, of each step (M, 3) of a closed curve that random sampling explains.
 
-    Steps inwards cut off tongues, which hold points: random ones are no longer than `inwards`. Steps outwards fill bays, which
+    Steps inwards cut off tongues, which hold points: random ones are no longer than `inwards` (M,). Steps outwards fill bays, which
     hold none: those are random where few points are expected in them.
 
     Parameters
     ----------
     out : (M, 3) direction outwards
     room : (M,) how far a step may lead outwards
-    density : points to a length of the steps and one place of the curve
+    density : (M,) points to a length of the steps and one place of the curve
     """
     along = dots(step, out)
     outwards = along > 0.0
     run = runs_around(outwards)
-    missing = np.bincount(run, np.abs(along))[run] * density
+    missing = np.bincount(run, np.abs(along) * density)[run]
     roomy = np.divide(room, along, out=np.full(len(along), np.inf), where=outwards)
     bay = np.minimum(2.0 - missing / POINTS_OF_CLOSED_BAY, roomy)
     tongue = 2.0 - np.linalg.norm(step, axis=1) / inwards

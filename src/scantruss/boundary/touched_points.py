@@ -12,15 +12,18 @@ from ..runtime.parallel import in_parts
 from ..surface.samples import SurfaceSamples, with_whole_boundary
 from ..surface.scratch import with_own_scratch
 from .curves import resample, smooth_turns
+from .density import SlidingDisc, density_along, reach_of_density
 
 STEPS_BACK = 16  # a boundary point touched again within this many steps was never left
 PLACES_PER_THREAD = 500  # fewest places of a loop that are worth a thread
 
 
 def boundary_points(
-    samples: SurfaceSamples, surface: Surface, loops: Sequence[np.ndarray], radius: float, step: float
-) -> list[np.ndarray]:
-    """Return the boundary points (M, 3) along each loop of samples: what a disc slid from outside touches, in order.
+    samples: SurfaceSamples, surface: Surface, loops: Sequence[np.ndarray], disc: SlidingDisc, step: float
+) -> tuple[list[np.ndarray], Surface]:
+    """Return the boundary points (M, 3) along each loop of samples, in order, and the surface with all points of the scan beside them.
+
+    They are what a disc slid from outside touches.
 
     If the surface was thinned, the disc slides once more, against all points near those that it touched first.
     """
@@ -29,15 +32,17 @@ def boundary_points(
         # a loop of larger samples cuts re-entrant corners; on a rough scan its own samples are the ones to trust
         for places, near in along:
             kernels.come_nearer(surface, places, near)
-    touched = [_touch_points(surface, places, near, radius, 8) for places, near in along]
+    reach = reach_of_density(surface, samples.area)
+    radii = [disc.radii(density_along(surface, places, reach)) for places, _ in along]
+    touched = [_touch_points(surface, *each, wide, 8) for each, wide in zip(along, radii, strict=True)]
     dense = with_whole_boundary(samples, surface, np.concatenate(touched)) if touched else surface
     if dense is not surface:
-        touched = [_touch_points(dense, places, near, radius, 8) for places, near in along]
+        touched = [_touch_points(dense, *each, wide, 8) for each, wide in zip(along, radii, strict=True)]
     touched = [
-        _touch_points(dense, smooth_turns(points), near, radius, 4)
-        for points, (_, near) in zip(touched, along, strict=True)
+        _touch_points(dense, smooth_turns(points), near, wide, 4)
+        for points, (_, near), wide in zip(touched, along, radii, strict=True)
     ]
-    return [_in_order(points, step) for points in touched]
+    return [_in_order(points, step) for points in touched], dense
 
 
 def _places_along(surface: Surface, loop: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray]:
@@ -56,13 +61,13 @@ def _in_order(touched: np.ndarray, step: float) -> np.ndarray:
     return touched[forward]
 
 
-def _touch_points(surface: Surface, places: np.ndarray, near: np.ndarray, radius: float, reach: int) -> np.ndarray:
-    """Return the points (M, 3) that a disc touches along a loop; its direction is taken from `reach` places before to `reach` after."""
+def _touch_points(surface: Surface, places: np.ndarray, near: np.ndarray, radii: np.ndarray, reach: int) -> np.ndarray:
+    """Return the points (M, 3) that a disc of radii (M,) touches along a loop, which is directed from `reach` places before to after."""
     touched, ahead = np.empty_like(places), np.roll(places, -reach, axis=0) - np.roll(places, reach, axis=0)
 
     def touch(part: int, begin: int, end: int) -> None:
         own = surface if part == 0 else with_own_scratch(surface)
-        kernels.touch_points(own, places, ahead, near, radius, touched, begin, end)
+        kernels.touch_points(own, places, ahead, near, radii, touched, begin, end)
 
     in_parts(len(places), PLACES_PER_THREAD, touch)
     return touched

@@ -278,9 +278,9 @@ def with_whole_boundary(samples: SurfaceSamples, surface: Surface, boundary_poin
     """Return the surface with all points of the scan near points of the boundary (R, 3), which locate it, if it has only some of them."""
     if samples.whole is None:
         return surface
-    near = samples.whole.take(
-        points_near(samples.whole, boundary_points, BESIDE_SAMPLES * samples.sample_spacing), axis=0
-    )
+    reach, given = BESIDE_SAMPLES * samples.sample_spacing, np.ones(len(surface.points), np.bool_)
+    near = samples.whole.take(points_near(samples.whole, boundary_points, reach), axis=0)
+    given[points_near(surface.points, boundary_points, reach)] = False
     owner, means, far = np.empty(len(near), np.int64), surface.mean, 2.0 * surface.radius
     in_parts(
         len(near),
@@ -288,8 +288,8 @@ def with_whole_boundary(samples: SurfaceSamples, surface: Surface, boundary_poin
         lambda _, begin, end: nearest_places(near, samples.boxes, means, far, owner, begin, end),
     )
     owned = np.repeat(np.arange(len(surface.mean)), np.diff(surface.start))
-    points = np.concatenate([surface.points, near[owner >= 0]])
-    grouped, start, _ = group(points, np.concatenate([owned, owner[owner >= 0]]), len(surface.mean))
+    points = np.concatenate([surface.points[given], near[owner >= 0]])
+    grouped, start, _ = group(points, np.concatenate([owned[given], owner[owner >= 0]]), len(surface.mean))
     return surface._replace(points=grouped, start=start)
 
 

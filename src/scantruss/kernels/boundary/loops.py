@@ -259,7 +259,7 @@ def touch_points(
     places: np.ndarray,
     ahead: np.ndarray,
     samples: np.ndarray,
-    radius: float,
+    radii: np.ndarray,
     touched: np.ndarray,
     begin: int,
     end: int,
@@ -270,11 +270,12 @@ def touch_points(
     ----------
     places, ahead : (M, 3) places along the loop and the direction of the loop there, the surface to its left
     samples : (M,) sample near each place
+    radii : (M,) of the disc at each place
     touched : (M, 3) filled with the point that the disc touches first
     """
     noise = 0.35 * surface.length
     for m in range(begin, end):
-        sample, place = samples[m], row(places, m)
+        sample, place, radius = samples[m], row(places, m), radii[m]
         normal = row(surface.normals, sample)
         out = unit(cross(row(ahead, m), normal))
         side = cross(normal, out)

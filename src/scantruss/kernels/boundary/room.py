@@ -7,7 +7,7 @@ import numpy as np
 from ...runtime.jit import kernel
 from ..geometry.boxes import SearchBoxes, search
 from ..geometry.vectors import Vector, along, cross, dot, norm, row, subtract, unit
-from ..surface.local_surface import Surface, walk
+from ..surface.local_surface import Surface, flood, walk
 
 SHEET_SINE = 0.4  # sine of the angle above the mean plane of two places, beyond which they lie on two sheets
 ONE_SHEET_COSINE = -0.5  # cosine between the normals of two places, above which they may lie on one sheet
@@ -99,3 +99,23 @@ def open_share(surface: Surface, boxes: SearchBoxes, places: np.ndarray, sample:
         if search(boxes, surface.mean, centre[0], centre[1], centre[2], 0.6 * radius, found) == 0:
             free += 1
     return free / max(count, 1)
+
+
+@kernel
+def points_beside(
+    surface: Surface, curve: np.ndarray, out: np.ndarray, sample: int, reach: float, counts: np.ndarray
+) -> None:
+    """Number of points within `reach` of each place of a curve (M, 3) on its inner side, on one sheet; `sample` is near the first place.
+
+    out : (M, 3) directions outwards. counts : (M,) to fill
+    """
+    for m in range(len(curve)):
+        place, outwards = row(curve, m), row(out, m)
+        sample = walk(surface, sample, place)
+        inside = 0
+        for i in range(flood(surface, sample, row(surface.mean, sample), reach + 2.0 * surface.radius)):
+            s = surface.queue[i]
+            for p in range(surface.start[s], surface.start[s + 1]):
+                d = subtract(row(surface.points, p), place)
+                inside += dot(d, d) <= reach * reach and dot(d, outwards) < 0.0
+        counts[m] = inside
