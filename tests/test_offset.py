@@ -269,6 +269,16 @@ def test_where_random_points_leave_the_corners_in_doubt_it_is_said_with_a_length
             assert "may be none" not in capsys.readouterr().err
 
 
+@pytest.mark.parametrize("radius", [0.5, 0.55, 0.6])
+@pytest.mark.parametrize("waves", [2, 3])
+def test_a_small_round_opening_has_no_corners(radius: float, waves: int) -> None:
+    """It turns by 90 degrees within sight everywhere: two corners made a leaf of it, 0.27 members off. A square one has four."""
+    turns = resample(circle(400, radius, 0.02, waves), CURVE_STEP)
+    assert len(find_corners(turns, st.Settings(length=1.0))[0]) == 0
+    square = resample(np.array([(-0.8, -0.8, 0), (0.8, -0.8, 0), (0.8, 0.8, 0), (-0.8, 0.8, 0)], float), CURVE_STEP)
+    assert len(find_corners(square, st.Settings(length=1.0))[0]) == 4
+
+
 def scanned_from(corner: tuple[float, float], count: int, seed: int) -> np.ndarray:
     """Points of a plate in the shape of an L, as many to an area as a scanner 3 m over a corner measures: fewer far away."""
     rng = np.random.default_rng(seed)

@@ -15,7 +15,7 @@ from .curves import outward
 
 POINTS_BESIDE = 40.0  # points on average beside a place of the boundary from which its density is counted
 # radius of the disc where points are sparse, in the sides of a square that holds one point: it seldom falls between them
-SIDES_IN_DISC = 1.8
+SIDES_IN_DISC = 1.5
 
 
 class SlidingDisc(NamedTuple):
