@@ -145,6 +145,13 @@ def test_a_place_that_was_closed_under_a_column_is_no_opening(reason: int, words
     assert words in warning.words and "0.8 m" in warning.words and warning.where == hole.where
 
 
+def test_a_large_opening_that_is_closed_is_not_promised_to_shorter_members() -> None:
+    """One that is four members around or more is no small hole: another length need not leave it open."""
+    samples = cast(SurfaceSamples, SimpleNamespace(scan=np.zeros((1, 3)), judged=np.array([KEPT]), origin=np.zeros(3)))
+    (warning,) = openings_closed([LeftOut("hole", 1, 0.0, (1.5, 1.0, 1.0), 2.0)], [], samples, LENGTH, "m")
+    assert warning.words == "closes an opening 2 m across"
+
+
 def test_a_hall_is_tried_without_its_columns_right_after_the_first_grid(hall: tuple[np.ndarray, np.ndarray]) -> None:
     """So that `info` finds its lengths with the few grids that it makes of each."""
     cloud = st.PointCloud.from_array(hall[0])

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..grid.certificate import Certificate, Fault, Spread, Worst, place_of
 from ..runtime.parallel import side_by_side
-from ..surface.chosen_samples import KEPT, OUTLIER
+from ..surface.chosen_samples import KEPT, LIMB, OUTLIER, SLIT
 from .bare import mostly_bare
 from .boundaries import places_aside, stops_short
 from .crossings import find_crossings
@@ -110,7 +110,8 @@ class Judged:
             lambda: [] if rough else rounded_peaks(grid, samples, found, followed, members),
         )
         scatter = offsets.get("node_scatter", 0.0) if rough else 0.0
-        rounded, beyond_scatter = shares_rounded(grid, samples, found, followed, members, scatter)
+        cut_but_near = followed | np.isin(samples.judged, (LIMB, SLIT))  # stubs of limbs are rounded off, not left out
+        rounded, beyond_scatter = shares_rounded(grid, samples, found, cut_but_near, members, scatter)
         too_far = mostly_rounded(beyond_scatter, missed_at)
         places = places_to_look_at(self.certificate, missed_at, 0.0 if too_far else rounded)
         closed = asked_for(closed_holes(samples, boundary), settings.fill_at, length)

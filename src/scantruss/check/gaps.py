@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from ..errors import words_of_number
 from ..grid.certificate import Fault, LeftOut, place_of
 from ..kernels.geometry.components import component_labels
+from ..settings import SMALLEST_HOLE
 from ..surface.chosen_samples import LIMB, ROD
 from .distances import nearest_point_distances
 from .limits import PLACES_KEPT
@@ -155,7 +157,8 @@ def openings_closed(
         "",
     )
     words = f"closes a place {what}, where {why}{more}" if why else ""
-    words = words or f"closes an opening {what}{more}; shorter members leave it open"
+    small = (wide[0].size or 0.0) < SMALLEST_HOLE / math.pi * length
+    words = words or f"closes an opening {what}{more}{'; shorter members leave it open' if small else ''}"
     return [Fault("closed", words, places[0] if places else None, tuple(places[1:PLACES_KEPT]))]
 
 

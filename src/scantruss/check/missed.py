@@ -58,7 +58,7 @@ def shares_rounded(
 
     Of a mean surface only that is rounded off which does not lie on both sides of it.
 
-    followed : (N,) bool, points of the scan that the grid is to follow
+    followed : (N,) bool, points of the scan that count: what the grid is to follow, and limbs that were cut off
     members : (N,) desired member length at each point [scan unit]
     scatter : usual distance of the points from the mean surface [scan unit]
     """

@@ -185,7 +185,7 @@ def grid_with_notes(
         "sharp_edges": "no grid passes without a look at the sharp edges of this body, so it is made as with --sharp-edges",
         "thin_walls": "the walls of this scan are thinner than a member, so the grid is made of both of their sides, as with --thin-walls",
         "plain_body": "no grid passes with all thin limbs and slits of this body, so it is made without, as with --plain-body",
-        "keep_rods": "a grid with the columns, scaffold or cables of this scan fails or misses them: what was found of them is left out",
+        "keep_rods": "no grid follows the columns, scaffold or cables of this scan: what was found of them is left out",
         "limb_girth": f"no grid passes with all thin limbs cut off, so it is made as with --limb-girth {made.limb_girth:g}",
         "ridge_angle": "no grid keeps the ridges of this scan, so it is made without, as with --ridge-angle 0",
         "box_size": f"no grid passes with the usual sample spacing, so it is made as with --box-size {made.box_size or 0:g}",

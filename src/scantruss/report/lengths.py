@@ -97,7 +97,7 @@ def advice_lines(advice: Advice, length: float, cloud: PointCloud) -> list[str]:
     if trial is not None and trial.grid is not None and trial.grid.certificate is not None:
         noise = trial.grid.certificate.noise
         lines.append(
-            f"noise {words_of_number(noise, 2)}{unit}, {noise / cloud.spacing:.2g} spacings, {noise / length:.2g} members"
+            f"noise {words_of_number(noise, 2)}{unit}, {noise / cloud.spacing:.2g} of a spacing, {noise / length:.2g} of a member"
         )
     lines += passing_lines(advice.tried, unit)
     if trial is not None and not trial.passed:
