@@ -14,7 +14,7 @@ import scantruss as st
 from scantruss.check.left_out import _beyond_cut
 from scantruss.check.sheets import broken_limb
 from scantruss.cli.main import main
-from scantruss.kernels.surface.girths import FACING_OPPOSITE, mark_opposite, measure_girths
+from scantruss.kernels.surface.girths import FACING_OPPOSITE, follow_girths, mark_opposite, measure_girths
 from scantruss.surface.chosen_samples import KEPT, LIMB
 from scantruss.surface.faced_surface import faced_surface
 from scantruss.surface.limbs import SMALLEST_RING
@@ -178,6 +178,33 @@ def test_a_handle_is_cut_off_however_thin_and_at_whatever_angle(
     assert cut[away > 5.3].all() and cut[away < 4.01].mean() < 0.005
 
 
+@pytest.mark.parametrize(("girth", "middle", "bend"), [(1.0, 4.0, 2.0), (1.5, 4.0, 2.5), (2.0, 4.3, 2.5)])
+def test_a_thin_handle_is_cut_off_at_the_body(girth: float, middle: float, bend: float) -> None:
+    """It was cut where a neighbourhood of a member shows its axis, and the stubs that were left stood up as fins."""
+    points = handle(girth, middle, bend, 60.0)
+    samples = samples_of(points, allow_missing=0.2)
+    assert len(samples.rings) == 2 and len(samples.pieces) == 1
+    cut, away = samples.judged == LIMB, np.linalg.norm(points, axis=1)
+    assert cut[away > 4.3].all() and cut[away < 4.001].mean() < 0.01
+    assert all(ring.girth == pytest.approx(girth, rel=0.1) for ring in samples.rings)
+
+
+def test_no_node_stands_up_where_a_handle_was_cut_off() -> None:
+    points = handle(1.2, 4.0, 2.0, 60.0)
+    grid = st.grid_from_points(points, st.Settings(length=1.0, effort="quick", allow_missing=0.2))
+    assert np.linalg.norm(grid.scan_nodes, axis=1).max() < 4.15
+
+
+def test_a_handle_is_cut_off_farther_out_where_less_may_be_missing() -> None:
+    points = handle(1.5, density=60.0)
+    share, most = {}, 0.05
+    for allowed in (0.2, most):
+        samples = samples_of(points, allow_missing=allowed)
+        share[allowed] = (samples.judged == LIMB).mean()
+        assert len(samples.rings) == 2
+    assert share[most] < share[0.2]
+
+
 def test_a_hole_through_a_body_is_no_limb_that_is_turned() -> None:
     rng = np.random.default_rng(0)
     around, across = rng.uniform(0, 2 * np.pi, 4000), rng.uniform(-2.0, 2.0, 4000)
@@ -276,6 +303,25 @@ def test_girths_of_a_cone_are_those_of_its_circles() -> None:
     inside = surface._replace(normals=-surface.normals)
     measure_girths(inside, some, 4.0, 0.15, hole, axis, 0, len(some))
     assert np.array_equal(hole[some], -girth[some]) and np.isnan(np.delete(hole, some)).all()
+
+
+@pytest.mark.kernels
+def test_the_axis_of_a_cone_is_found_from_one_that_is_about_right() -> None:
+    radius, axis_x = np.array([0.45, 0.25]), np.array([0.0, 4.0])
+    points = turned(radius, axis_x, 120.0, 3)
+    cloud = st.PointCloud.from_array(points)
+    surface, _, _ = faced_surface(link_samples(cloud.points, 0.1, 1.0, cloud.spacing), 0.1, 1.0, cloud.spacing)
+    count = len(surface.mean)
+    girth, axis = np.full(count, np.nan), np.tile([np.cos(0.5), np.sin(0.5), 0.0], (count, 1))
+    x = surface.mean[:, 0] + cloud.origin[0]
+    some = np.flatnonzero((x > 0.5) & (x < 3.5))
+    follow_girths(surface, some, np.full(len(some), 3.5), 0.15, girth, axis)
+    true = 2 * np.pi * np.interp(x[some], axis_x, radius)
+    seen = np.isfinite(girth[some])
+    assert seen.mean() > 0.95 and np.abs(girth[some][seen] / true[seen] - 1.0).max() < 0.12
+    assert np.median(np.abs(axis[some, 0])) > 0.99 and np.isnan(np.delete(girth, some)).all()
+    follow_girths(surface, some, 0.5 * true, 0.15, girth, axis)
+    assert np.isinf(girth[some]).all(), "larger than a limb may be there"
 
 
 @pytest.mark.kernels

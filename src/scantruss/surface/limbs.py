@@ -4,33 +4,36 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from itertools import chain
 
 import numpy as np
 
 from ..kernels.geometry.boxes import SearchBoxes
 from ..kernels.geometry.components import component_labels
 from ..kernels.scan.nearby import nearest_places
-from ..kernels.surface.girths import mark_opposite, measure_girths
+from ..kernels.surface.girths import mark_opposite
 from ..kernels.surface.local_surface import Surface, flood
 from ..kernels.surface.rods import spreads_around
-from ..runtime.parallel import in_parts, run_in_parts
-from .faced_surface import faced_surface
+from ..runtime.parallel import run_in_parts
 from .given_normals import GivenNormals
-from .linked_samples import link_samples
 from .pieces import LEAST_TRIANGLES, TRIANGLE_AREA, sample_areas
 from .rods import line_like
-from .scratch import with_own_scratch
+from .tubes import (
+    FINE_SAMPLES,
+    HALF_SECTION,
+    FineSamples,
+    alike_parts,
+    faces_inwards,
+    follow_limbs,
+    girths,
+    most_beside,
+)
 
+# share of the tubes that face inwards that do so by samples half as wide too, if these are taken
+LEAST_TURNED_BACK = 0.5
 # distance from a sample within which one faces the opposite way on a limb too thin [desired lengths]
 SUSPECT_WITHIN = 1.1
 FEWEST_ALONG_LINE = 5  # fewest samples that show that others lie along a line
-FINE_SAMPLES = 0.1  # radius of the samples by which girths are measured [member lengths]
-# share of the tubes that face inwards that do so by samples half as wide too, if these are taken
-LEAST_TURNED_BACK = 0.5
-HALF_SECTION = 0.15  # half the thickness of a section [desired lengths]
-LARGEST_GIRTH = 1.2  # largest girth that is measured [girth below which limbs are cut off]
-PASSES_OF_MAJORITY = 3  # passes in which a sample becomes what most of those linked to it are
 FEWEST_OF_LIMB = 12  # fewest samples of a part that is cut off
 BLUNT_END = 2.0  # least area of an end that is wider than a member [desired lengths^2]
 SURE_GIRTH = 0.95  # girth at the thinnest twentieth of a limb above which it is not cut off [girth below which limbs are cut off]
@@ -38,6 +41,7 @@ CLEAN_RING_SHARE = 0.8  # least share of the samples on each side of a ring that
 NECK_GIRTH = 0.8  # girth down to which a neck before such an end stays [girth below which limbs are cut off]
 LOOKED_AROUND_RING = 0.4  # how far a ring is looked around for, beside its own radius [desired lengths]
 NEAR_PLANE = 0.3  # distance from the plane of a ring up to which points show its shape [desired lengths]
+AROUND_RING = 1.5  # how far from the middle of a ring they may be [distance of the farthest sample at its edge]
 RING_WAVES = 3  # of a ring: its radius is a Fourier series of so many terms
 WIDEST_GAP = 100.0  # largest angle without points, seen from the middle of a ring [degree]
 # girth of a ring below which it is no boundary but a hole that the front runs over [desired lengths]
@@ -60,6 +64,7 @@ def cut_limbs(
     points: np.ndarray,
     spacing: float,
     girth: float,
+    allow_missing: float,
     surface: Surface,
     boxes: SearchBoxes,
     given: GivenNormals | None = None,
@@ -71,6 +76,8 @@ def cut_limbs(
     ----------
     girth : float
         Below which limbs are cut off [desired lengths].
+    allow_missing : float
+        Share of the points that may be missing: limbs are cut off where they leave the body, unless that is more.
     surface, boxes : Surface, SearchBoxes
         The samples of the points.
     given : GivenNormals, optional
@@ -90,10 +97,24 @@ def cut_limbs(
     if parts is None:
         return none
     gone, rings = parts.cut()
+    if _far_from_rest(points, which[gone], owner, surface) > allow_missing * len(points):
+        gone, rings = parts.cut(at_body=False)
     if not gone.any() or gone.sum() > MOST_OF_SCAN_THIN * len(points):
         return none
     none[0][which[gone]] = True
     return none[0], rings
+
+
+def _far_from_rest(points: np.ndarray, gone: np.ndarray, owner: np.ndarray, surface: Surface) -> int:
+    """Return how many of the points (N, 3) of samples (N,) that are cut off (K,) lie more than half a member from the rest."""
+    from scipy.spatial import cKDTree
+
+    owned = owner[owner >= 0]
+    rest = 2 * np.bincount(owner[gone], minlength=len(surface.mean)) <= np.bincount(owned, minlength=len(surface.mean))
+    if not len(gone) or not rest.any():
+        return len(gone)
+    away = cKDTree(surface.mean[rest]).query(points[gone])[0]
+    return int((away > 0.5 * surface.length * surface.field[owner[gone]]).sum())
 
 
 def _suspects(surface: Surface, boxes: SearchBoxes, girth: float, smooth: bool) -> np.ndarray:
@@ -122,58 +143,10 @@ def _along_lines(surface: Surface, boxes: SearchBoxes, girth: float) -> np.ndarr
 def _bodies_beside(suspect: np.ndarray, surface: Surface) -> np.ndarray:
     """Return at each suspect sample (S,) the number of the rest of the scan that it is linked to, -1 where it is linked to none."""
     linked = (surface.neighbors >= 0) & ~suspect[surface.neighbors] & suspect[:, None]
-    body, at = _labels(suspect, surface.neighbors), np.flatnonzero(linked.any(axis=1))
+    body, at = alike_parts(suspect, surface.neighbors), np.flatnonzero(linked.any(axis=1))
     beside = np.full(len(suspect), -1)
     beside[at] = body[surface.neighbors[at, linked[at].argmax(axis=1)]]
     return beside
-
-
-class _FineSamples(NamedTuple):
-    """Fine samples of some points."""
-
-    surface: Surface
-    owner: np.ndarray  #: (N,) fine sample of each point
-    chosen: np.ndarray  #: (S,) point of each
-
-    @classmethod
-    def of(
-        cls,
-        points: np.ndarray,
-        coarse: np.ndarray,
-        radius: float,
-        spacing: float,
-        scan: Surface,
-        given: GivenNormals | None,
-    ) -> _FineSamples:
-        """Return those of a radius of points of samples of the scan (N,)."""
-        found = link_samples(points, radius, scan.length, spacing, given)
-        surface, piece, _ = faced_surface(found, radius, scan.length, spacing)
-        of_scan = coarse[found.chosen]
-        surface = surface._replace(field=np.ascontiguousarray(scan.field[of_scan]))
-        agree = np.bincount(piece, np.einsum("si,si->s", surface.normals, scan.normals[of_scan]))
-        surface.normals[agree[piece] < 0.0] *= -1.0
-        return cls(surface, found.owner, found.chosen)
-
-
-def _girths(surface: Surface, limit: float, which: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Return the girth (S,) and the axis (S, 3) of the limb at all samples or some (K,), up to somewhat beyond a limit [desired lengths].
-
-    A girth is less than 0 where the limb faces inwards.
-    """
-    girth, axis = np.full(len(surface.mean), np.inf), np.zeros((len(surface.mean), 3))
-    some = np.arange(len(girth)) if which is None else which
-
-    def measure(part: int, begin: int, end: int) -> None:
-        own = surface if part == 0 else with_own_scratch(surface)
-        measure_girths(own, some, LARGEST_GIRTH * limit, HALF_SECTION, girth, axis, begin, end)
-
-    in_parts(len(some), LIMBS_PER_THREAD, measure)
-    return girth / (surface.length * surface.field), axis
-
-
-def _faces_inwards(girth: np.ndarray, limit: float) -> np.ndarray:
-    """Return which samples lie on a tube so thin that faces inwards (S,) bool: a hole, or a limb turned inside out."""
-    return np.asarray((girth < 0.0) & (girth > -limit))
 
 
 @dataclass(frozen=True, eq=False)
@@ -188,6 +161,9 @@ class _Parts:
     limit: float  #: girth below which limbs are cut off [desired lengths]
     label: np.ndarray  #: (S,) number of the part of each sample
     thin: np.ndarray  #: (S,) bool
+    reached: (
+        np.ndarray
+    )  #: (S,) step in which each was found to be thin, by following a limb to the body; else 0, or less
     solid: np.ndarray  #: (S,) bool, of a part that is no end of a limb
     body: np.ndarray  #: (S,) number of the rest of the scan that is linked to each, -1 where it is linked to none
 
@@ -205,43 +181,44 @@ class _Parts:
         """Return the parts of points (N, 3) of samples of the scan (N,), beside its other parts (T,); None where none is thin."""
         length = scan.length
         radius, finest = FINE_SAMPLES * length, 0.25 * spacing
-        fine = _FineSamples.of(points, coarse, max(radius, finest), spacing, scan, given)
-        girth, axis = _girths(fine.surface, limit)
-        inwards = _faces_inwards(girth, limit)
+        fine = FineSamples.of(points, coarse, max(radius, finest), spacing, scan, given)
+        girth, axis = girths(fine.surface, limit)
+        inwards = faces_inwards(girth, limit)
         if inwards.sum() >= FEWEST_OF_LIMB:  # holes, or limbs turned inside out at an acute angle with the body
-            finer = _FineSamples.of(points, coarse, max(0.5 * radius, finest), spacing, scan, given)
+            finer = FineSamples.of(points, coarse, max(0.5 * radius, finest), spacing, scan, given)
             there = np.flatnonzero(inwards[fine.owner[finer.chosen]])
-            again = _faces_inwards(_girths(finer.surface, limit, there)[0][there], limit)
+            again = faces_inwards(girths(finer.surface, limit, there)[0][there], limit)
             if again.mean() < LEAST_TURNED_BACK:
                 fine = finer
-                girth, axis = _girths(fine.surface, limit)
+                girth, axis = girths(fine.surface, limit)
         girth[girth < 0.0] = np.inf
         surface, owner, of_scan = fine.surface, fine.owner, coarse[fine.chosen]
-        thin = _smoothed(girth < limit, surface.neighbors)
+        thin = most_beside(girth < limit, surface.neighbors)
+        reached, axis = follow_limbs(surface, thin, girth, axis, limit)
+        thin = reached >= 0
         if thin.sum() < FEWEST_OF_LIMB:
             return None
         area = sample_areas(surface) / (length * surface.field) ** 2
-        label = _labels(thin, surface.neighbors)
+        label = alike_parts(thin, surface.neighbors)
         total = np.bincount(label, area, len(label))
         body = bodies[of_scan]
         at_boundary = np.bincount(label, body >= 0, len(label)) > 0
         small = ~thin & ~at_boundary[label] & (total[label] < BLUNT_END)
         thin = thin | small
-        label = _labels(thin, surface.neighbors)
+        label = alike_parts(thin, surface.neighbors)
         few = thin & (np.bincount(label, minlength=len(label))[label] < FEWEST_OF_LIMB)
         if few.any():
             thin = thin & ~few
-            label = _labels(thin, surface.neighbors)
+            label = alike_parts(thin, surface.neighbors)
         total = np.bincount(label, area, len(label))
         at_boundary = np.bincount(label, body >= 0, len(label)) > 0
         solid = ~thin & (at_boundary | (total >= LEAST_TRIANGLES * TRIANGLE_AREA))[label]
-        return cls(points, owner, surface, axis, girth, limit, label, thin, solid, body)
+        return cls(points, owner, surface, axis, girth, limit, label, thin, reached, solid, body)
 
-    def cut(self) -> tuple[np.ndarray, tuple[LimbRing, ...]]:
-        """Return which points (N,) bool are cut off, and the rings."""
-        beside, label = self.surface.neighbors, self.label
-        one, k = np.nonzero((beside >= 0) & self.thin[:, None] & ~self.thin[beside])
-        other = beside[one, k]
+    def cut(self, at_body: bool = True) -> tuple[np.ndarray, tuple[LimbRing, ...]]:
+        """Return which points (N,) bool are cut off, and the rings: where limbs leave the body, or where they are seen to be thin."""
+        label = self.label
+        one, other = self._links(self.thin, ~self.thin)
         kept_necks = self._kept_necks(label[one], label[other])
         joined = np.isin(label[one], kept_necks)
         whole = component_labels(len(label), label[one[joined]], label[other[joined]])[label]
@@ -252,15 +229,46 @@ class _Parts:
             gone = whole == limb
             if self._thinnest(gone & self.thin) > SURE_GIRTH * self.limit:
                 continue
-            ends = gone[one] & ~gone[other]
-            own, off = [], gone[self.owner]
-            for edge in self._groups(one[ends], other[ends]):
-                own.append(self._ring(edge, gone, off))
-            found = [ring for ring in own if ring is not None]
-            if found and len(found) == len(own):  # what has no clean end stays
-                rings += found
+            off = gone[self.owner]
+            found = [self._rings_at(end, gone, off, at_body) for end in self._ends(gone)]
+            if found and all(found):  # what has no clean end stays
+                rings += chain.from_iterable(found)
                 removed |= off
         return removed, tuple(rings)
+
+    def _ends(self, gone: np.ndarray) -> list[np.ndarray]:
+        """Return the samples (S,) bool at each end of what is cut off (S,) bool: at its edge, and those as far as it was followed there."""
+        followed = alike_parts(gone & (self.reached > 0), self.surface.neighbors)
+        ends: list[np.ndarray] = []
+        for edge in self._groups(*self._links(gone & self.thin, ~gone & ~self.thin)):
+            end = np.isin(followed, followed[edge[self.reached[edge] > 0]])
+            end[edge] = True
+            if not any(end[edge].all() for end in ends):
+                ends.append(end)
+        return ends
+
+    def _rings_at(self, end: np.ndarray, gone: np.ndarray, removed: np.ndarray, at_body: bool) -> list[LimbRing]:
+        """Return the rings at an end (S,) bool of what is cut off, as near to the body as all are clean, and mark what lies beyond."""
+        for step in range(int(self.reached[end].max()) if at_body else 0, -1, -1):
+            stays = end & (self.reached > step)
+            left = gone & ~stays
+            one, other = self._links(left & self.thin, ~left & (end | ~self.thin))
+            here = end[one] | stays[other]
+            before = left[self.owner]
+            off = before.copy()
+            rings = [self._ring(edge, left, off) for edge in self._groups(one[here], other[here])]
+            found = [ring for ring in rings if ring is not None]
+            if found and len(found) == len(rings):
+                removed[stays[self.owner]] = False
+                removed[off != before] = off[off != before]
+                return found
+        return []
+
+    def _links(self, one: np.ndarray, other: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the links (L,), (L,) from some samples (S,) bool to others (S,) bool."""
+        beside = self.surface.neighbors
+        at, k = np.nonzero((beside >= 0) & one[:, None] & other[beside])
+        return at, beside[at, k]
 
     def _kept_necks(self, thin: np.ndarray, fat: np.ndarray) -> np.ndarray:
         """Return the labels of thin parts that stay, of all links thin-fat (L,).
@@ -311,20 +319,27 @@ class _Parts:
         radius = float(np.linalg.norm(surface.mean[edge] - middle, axis=1).max())
         count = flood(surface, int(edge[0]), tuple(middle), radius + LOOKED_AROUND_RING * length)
         near = surface.queue[:count].copy()
-        normals = surface.normals[near[np.linalg.norm(surface.mean[near] - middle, axis=1) < radius + 0.2 * length]]
-        axis = np.linalg.eigh(normals.T @ normals)[1][:, 0]
+        followed = bool((self.reached[edge] > 0).any())
+        if followed:
+            axis = np.linalg.eigh(self.axis[edge].T @ self.axis[edge])[1][:, 2]
+        else:
+            normals = surface.normals[near[np.linalg.norm(surface.mean[near] - middle, axis=1) < radius + 0.2 * length]]
+            axis = np.linalg.eigh(normals.T @ normals)[1][:, 0]
         if gone[near].all() or not gone[near].any():  # a one-sided surface: no side is cut off there
             return None
         side = surface.mean[near[gone[near]]].mean(axis=0) - surface.mean[near[~gone[near]]].mean(axis=0)
         axis = axis * np.sign(side @ axis)
         frame = np.stack([*_frame(axis), axis])
         mine = np.flatnonzero(np.isin(self.owner, near))
+        at_edge = (surface.mean[edge] - middle) @ frame.T
+        wide = AROUND_RING * float(np.hypot(at_edge[:, 0], at_edge[:, 1]).max()) if followed else np.inf
         for _ in range(2):
             flat = (self.points[mine] - middle) @ frame.T
-            close = np.abs(flat[:, 2]) < NEAR_PLANE * length
+            close = (np.abs(flat[:, 2]) < NEAR_PLANE * length) & (np.hypot(flat[:, 0], flat[:, 1]) < wide)
             middle = middle + frame[:2].T @ _middle(flat[close, :2])
         flat = (self.points[mine] - middle) @ frame.T
-        fitted = _fit_ring(flat[np.abs(flat[:, 2]) < NEAR_PLANE * length])
+        close = (np.abs(flat[:, 2]) < NEAR_PLANE * length) & (np.hypot(flat[:, 0], flat[:, 1]) < wide)
+        fitted = _fit_ring(flat[close])
         if fitted is None:
             return None
         turn = -2.0 * np.pi * np.arange(POINTS_OF_RING) / POINTS_OF_RING
@@ -338,24 +353,14 @@ class _Parts:
             if (gone[near[clear]] == (way > 0.0)).sum() < CLEAN_RING_SHARE * clear.sum():
                 return None
         bounds = girth > SMALLEST_RING * length
-        inside = np.hypot(flat[:, 0], flat[:, 1]) < 1.3 * out.max()
-        removed[mine[inside]] = flat[inside, 2] > (0.0 if bounds else -HALF_SECTION * length)
+        away = np.hypot(flat[:, 0], flat[:, 1]) / out.max()
+        inside = away < 1.3
+        end = 0.0 if bounds else -HALF_SECTION * length
+        body = ~inside & (away < 2.0) & (flat[:, 2] < 0.0)
+        if followed and not bounds and body.any():  # where the body begins beside the limb
+            end = max(min(float(np.quantile(flat[body, 2], 0.98)), end), -LOOKED_AROUND_RING * length)
+        removed[mine[inside]] = flat[inside, 2] > end
         return LimbRing(ring, girth, bounds)
-
-
-def _smoothed(marks: np.ndarray, beside: np.ndarray) -> np.ndarray:
-    """Return marks (S,) bool as most of the samples linked to each have them."""
-    linked = beside >= 0
-    for _ in range(PASSES_OF_MAJORITY):
-        marks = (marks[beside] & linked).sum(axis=1) + marks > 0.5 * (linked.sum(axis=1) + 1)
-    return marks
-
-
-def _labels(marks: np.ndarray, beside: np.ndarray) -> np.ndarray:
-    """Return a number for each sample (S,): the same where samples with the same mark hang together."""
-    one, k = np.nonzero((beside >= 0) & (marks[beside] == marks[:, None]))
-    label: np.ndarray = component_labels(len(marks), one, beside[one, k])
-    return label
 
 
 def _frame(axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -17,6 +17,8 @@ FACING_OPPOSITE = -0.3  # cosine between the normals of two samples below which 
 MOST_MEAN_NORMAL = 0.6  # largest mean normal of a section that is closed; half a pipe has 0.64, a strip 1
 # mean cosine between normals and arms from the middle of a section below which it is a hole, no limb
 INWARD_COSINE = -0.3
+SAME_LIMB = 0.6  # least cosine between the axes of sections of a limb beside each other
+TURNS_OF_AXIS = 3  # times that the axis of a limb is turned until it stands across the section
 
 
 @kernel
@@ -63,6 +65,38 @@ def measure_girths(
         count = _flood_section(surface, s, a, half * length, 0.5 * most * length, section)
         if count > 0:
             girth[s] = _girth_of(surface, section, count, a)
+
+
+@kernel
+def follow_girths(
+    surface: Surface, which: np.ndarray, most: np.ndarray, half: float, girth: np.ndarray, axis: np.ndarray
+) -> None:
+    """Fill in the girth (S,) at each sample of `which` (K,) whose axis (S, 3) is about that of the limb beside it, and turn the axis.
+
+    Infinity where its section is open, faces inwards or is larger than `most` (K,) [desired lengths there].
+    """
+    section = np.empty(len(surface.mean), np.int64)
+    for i in range(len(which)):
+        s = which[i]
+        girth[s] = math.inf
+        length = surface.length * surface.field[s]
+        a = before = row(axis, s)
+        count = _flood_section(surface, s, a, half * length, 0.5 * most[i] * length, section)
+        for _ in range(TURNS_OF_AXIS):
+            xx = xy = xz = yy = yz = zz = 0.0
+            for k in range(count):
+                n = row(surface.normals, section[k])
+                xx, xy, xz = xx + n[0] * n[0], xy + n[0] * n[1], xz + n[0] * n[2]
+                yy, yz, zz = yy + n[1] * n[1], yz + n[1] * n[2], zz + n[2] * n[2]
+            if count > 0:
+                a = smallest_eigenvector(xx, xy, xz, yy, yz, zz)
+                count = _flood_section(surface, s, a, half * length, 0.5 * most[i] * length, section)
+        if count == 0 or abs(dot(a, before)) < SAME_LIMB:
+            continue
+        found = _girth_of(surface, section, count, a)
+        if 0.0 < found <= most[i] * length:
+            girth[s] = found
+            axis[s, 0], axis[s, 1], axis[s, 2] = a
 
 
 @kernel
