@@ -27,9 +27,10 @@ from scantruss.errors import CertificateError, FrontError
 from scantruss.front.orientation_field import orientation_fields
 from scantruss.grid.certificate import Fault
 from scantruss.improve.candidate import grid_of as grid_of_candidate
-from scantruss.improve.longer_search import FREE_TURNS, SPARING_TURNS, search_on
+from scantruss.improve.longer_search import FREE_TURNS, SPARED_AT_FAULT, SPARING_TURNS, search_on
 from scantruss.improve.optimize import improve_last, searched_again
 from scantruss.improve.working_mesh import WorkingMesh
+from scantruss.kernels.mesh.grid import AT_REST
 from scantruss.runtime import parallel
 from scantruss.scan.formats.writing import write_points
 from scantruss.surface.samples import sample_surface
@@ -323,7 +324,10 @@ def test_a_grid_with_ridges_is_searched_on_and_is_in_no_figure_worse() -> None:
 def test_a_longer_search_spares_the_places_of_its_faults_and_begins_again_from_its_last_good_grid(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The second half of the turns all fail at one place: each of them begins from the same grid, and those after the first spare it."""
+    """The second half of the turns all fail at one place, and each of them begins from the same grid.
+
+    Those after the first spare the place, and those after the second leave its nodes where they are.
+    """
     cloud = st.PointCloud.from_array(cap(4.0, 1.0, 0.25))
     settings = st.Settings(length=1.0)
     steps = steps_of(cloud, settings)
@@ -331,11 +335,19 @@ def test_a_longer_search_spares_the_places_of_its_faults_and_begins_again_from_i
     improved = candidates.improve_fronts(candidates.advance_fronts(*steps, fields, settings), *steps, settings)
     best = candidates.chosen(candidates.those_that_pass(improved, *steps, settings))
     begun: list[tuple[bytes, list[int]]] = []
-    fault = Fault("torn", "is torn", (0.5, 0.25, 0.0))
+    held, moved = list[int](), list[float]()
+    fault = Fault("torn", "is torn", (0.5, 0.25, 4.0))
 
     def searched(mesh: WorkingMesh, *others: Any) -> st.Grid:
         begun.append((mesh.net.nodes.tobytes(), [len(each.places) for each in others[-2]]))
-        return searched_again(mesh, *others)
+        place = np.array(fault.where) - steps.samples.origin
+        near = np.linalg.norm(mesh.net.nodes - place, axis=1) < SPARED_AT_FAULT * mesh.length
+        at_rest = near & (mesh.net.degree > 0) & (mesh.net.kind == AT_REST)
+        held.append(int(at_rest.sum()))
+        before = mesh.net.nodes[at_rest]
+        grid = searched_again(mesh, *others)
+        moved.append(float(np.linalg.norm(mesh.net.nodes[at_rest] - before, axis=1).max(initial=0.0)))
+        return grid
 
     def check(grid: st.Grid, *others: Any) -> Any:
         now = judge(grid, *others)
@@ -348,6 +360,8 @@ def test_a_longer_search_spares_the_places_of_its_faults_and_begins_again_from_i
     sparing = begun[FREE_TURNS:]
     assert len({nodes for nodes, _ in sparing}) == 1
     assert [spared for _, spared in sparing] == [[k, 0] for k in range(SPARING_TURNS)]
+    assert max(moved) < 1e-6
+    assert min(held[FREE_TURNS + 2 :]) > max(held[: FREE_TURNS + 2])
     assert known(grid_of_candidate(best).certificate).passed
 
 

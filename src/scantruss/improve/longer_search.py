@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..check.distances import distances_to_grid
+from ..kernels.mesh.grid import AT_REST, Net
 from .candidate import Candidate, grid_of, judged
 from .optimize import searched_again
 from .perturbation import LONGER, Spared
@@ -43,20 +46,24 @@ def search_on(
 
     The first turns go on from each other, whatever comes of them. Then it is searched on from the grid taken: a turn that ends in a fault
     or farther from the scan is taken back, and the places where it went wrong are spared from then on. Most of them are tips, limbs and
-    clefts about a member wide, which hold up all the rest.
+    clefts about a member wide, which hold up all the rest. Where a spared place fails again, as its nodes still settle, they stay where
+    they are.
 
     least_shape : mean shape quality below which no grid is taken
     """
     mesh, first, usual = candidate.mesh, candidate.judged, grid_of(candidate)
     assert first is not None
-    kept, off, faulty, lost = mesh.copied(), _distances_off(usual, samples), _NOWHERE, _NOWHERE
+    kept, off, faulty, lost, held = mesh.copied(), _distances_off(usual, samples), _NOWHERE, _NOWHERE, _NOWHERE
     for turn in range(FREE_TURNS + SPARING_TURNS):
         is_sparing = turn >= FREE_TURNS
         if turn == FREE_TURNS:
             mesh.restore(kept)
         spared = Spared(faulty, SPARED_AT_FAULT * mesh.length), Spared(lost, SPARED_AT_LOSS * mesh.length)
         number = turn - FREE_TURNS + 1 if is_sparing else 0
-        grid = searched_again(mesh, candidate.front, samples, constraints, candidate.settings, LONGER, spared, number)
+        with _at_rest(mesh.net, ~Spared(held, spared[0].reach).away(mesh.net.nodes)):
+            grid = searched_again(
+                mesh, candidate.front, samples, constraints, candidate.settings, LONGER, spared, number
+            )
         now = judged(grid, samples, boundary, settings)
         grid = now.checked_grid
         if now.certificate.passed and is_as_near(grid, usual):
@@ -70,7 +77,9 @@ def search_on(
             mesh.restore(kept)
             wrong = [place for fault in now.certificate.faults for place in (fault.where, *fault.also) if place]
             if wrong:
-                faulty = np.concatenate([faulty, np.array(wrong) - samples.origin])
+                places = np.array(wrong) - samples.origin
+                held = np.concatenate([held, places[~spared[0].away(places)]])
+                faulty = np.concatenate([faulty, places])
             else:
                 away = _distances_off(grid, samples)
                 is_lost = (away > off + LEAST_FARTHER) & (away > np.quantile(off, FAR_PLACES))
@@ -79,6 +88,16 @@ def search_on(
         candidate.judged, candidate.grid = first, usual
     else:
         candidate.end()
+
+
+@contextmanager
+def _at_rest(net: Net, which: np.ndarray) -> Iterator[None]:
+    """Let some nodes of a net (C,) bool stay where they are for a while."""
+    moving = which & (net.degree > 0) & (net.kind < AT_REST)
+    kinds = net.kind[moving]
+    net.kind[moving] = AT_REST
+    yield
+    net.kind[moving] = kinds
 
 
 def _is_no_poorer(now: Judged, first: Judged) -> bool:
