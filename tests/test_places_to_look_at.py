@@ -27,7 +27,7 @@ from scantruss.errors import CertificateError
 from scantruss.grid.certificate import Certificate, Fault, LeftOut
 from scantruss.report.figures import left_out_lines
 from scantruss.scan.cloud import by_x
-from scantruss.surface.chosen_samples import OUTLIER
+from scantruss.surface.chosen_samples import KEPT, LIMB, OUTLIER
 from scantruss.surface.samples import sample_surface
 
 SETTINGS = st.Settings(length=1.0)
@@ -245,6 +245,22 @@ def test_what_a_grid_of_the_mean_surface_cuts_off_is_said_in_full_where_most_of_
     said, share = int(re.findall(r"rounds off (\d+)%", warning.words)[0]), 100 * (np.abs(points[:, 2]) > 0.25).mean()
     assert 0.8 * share < said < 1.2 * share
     assert known(found.node_scatter) > 0.05  # by which nearly all of that was taken for scatter
+
+
+def test_the_stub_of_a_limb_that_was_cut_off_is_rounded_off() -> None:
+    """It lies so near to the grid that it is not left out, and was in no figure at all."""
+    points = sheet(13, 8, 0.08)
+    samples, grid = scanned(points, lattice())
+    scan, stub = samples.scan.copy(), np.linalg.norm(samples.scan[:, :2], axis=1) < 1.5
+    scan[stub, 2] += 0.4
+    cut = replace(samples, scan=scan, judged=np.where(stub, LIMB, KEPT).astype(np.uint8))
+    said = [
+        int(re.findall(r"rounds off (\d+)%", each.words)[0])
+        for one in (samples, cut)
+        for each in certify(grid, one, NOTHING, SETTINGS).warnings
+        if each.kind == "rounded"
+    ]
+    assert said[1] - said[0] == pytest.approx(100.0 * stub.mean(), abs=1.0)
 
 
 def bounded(grid: st.Grid) -> Boundary:
