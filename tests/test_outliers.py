@@ -258,6 +258,19 @@ def test_a_sparse_corner_of_a_roof_is_no_stray(density: float) -> None:
     assert outlier[sparse[kept]].mean() <= 0.2 and outlier[~sparse[kept]].mean() <= 0.001
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_the_far_end_of_a_roof_scanned_from_one_corner_is_no_stray(seed: int) -> None:
+    """Its points are a hundred times fewer, but hardly fewer than those beside them: the corner was cut off by a member and a half."""
+    rng = np.random.default_rng(seed)
+    roof = rng.uniform((0.0, 0.0), (24.0, 16.0), (900_000, 2))
+    away = np.hypot(np.hypot(*(roof - 1.5).T.copy()), 5.0)
+    roof = roof[rng.random(len(roof)) < (5.0 / away) ** 3][:20_000]
+    z = 6.0 - 0.03 * (roof[:, 1] - 8.0) ** 2 + rng.normal(0.0, 0.004, len(roof))
+    strays = rng.uniform((0.0, 0.0, 0.0), (24.0, 16.0, 12.0), (40, 3))
+    found = outliers.find_outliers(np.concatenate([np.column_stack([roof, z]), strays]), 3.0)
+    assert found[: len(roof)].sum() <= 20 and found[len(roof) :].sum() >= 36
+
+
 def test_a_sparse_wall_beside_a_dense_one_is_no_stray() -> None:
     """A vessel whose inner wall has a tenth of the points of the outer one, a little more than its own spacing away."""
     rng = np.random.default_rng(1)

@@ -47,6 +47,8 @@ OPEN_EDGE = 0.05
 MANY_OF_PART, EDGE_OF_COMPACT = 200, 3.3
 # the same of a part of fewer points, of which some lie so deep in it that it is no fringe: distance from the rest of the scan [reaches]
 SOME_OF_PART, EDGE_OF_CORNER, DEEP_IN_PART, SHARE_DEEP = 80, 1.55, 3.0, 0.2
+# where a part is the scan grown sparse, most of its points that lie within so many reaches of others are about as far apart as those
+BESIDE_OTHERS, GRADED_REACHES = 2.0, 1.7
 LONE_SHARE = 3e-4  # share of samples without neighbours above which outliers are sought
 ENOUGH_AROUND = 6  # neighbours with which a sample is not alone
 # distance between samples where no member length is given, and within which they have neighbours [spacings of the points]: as those
@@ -163,7 +165,7 @@ def _on_sheets(
     """Return which of the doubted points (D,) lie on a sheet that they form with each other and those spared: a sparse part in the scan.
 
     A few in one plane may be random, and a sparse fringe beyond the edge of the scan is no part of it; a wide sparse part there is,
-    as what lies far from the scanner.
+    as what lies far from the scanner: there the points are hardly farther apart than those of the scan beside them.
     """
     company, at_edge = np.empty((len(doubted), kernels.POINTS_OF_SHEET), np.int64), np.zeros(len(doubted), np.bool_)
     number = np.full(len(alive), -1)
@@ -182,13 +184,19 @@ def _on_sheets(
     size, edges = np.bincount(part, on, len(doubted)), np.bincount(part, on & at_edge, len(doubted))
     compact = (size >= MANY_OF_PART) & (edges <= EDGE_OF_COMPACT * np.sqrt(size))
     few = (size >= SOME_OF_PART) & ~compact & (edges <= EDGE_OF_CORNER * np.sqrt(size))
-    if few.any() and alive.any():
-        which, squares = np.flatnonzero(on & few[part]), np.empty(int((on & few[part]).sum()))
+    if on.any() and alive.any():
+        which, squares, nearest = np.flatnonzero(on), np.empty(int(on.sum())), np.empty(int(on.sum()), np.int64)
         places = np.ascontiguousarray(near.tree.points[doubted[which]])
-        others = build_kd_tree(np.ascontiguousarray(near.tree.points[alive]))
-        nearest_of_places(others, places, 1, squares, np.empty(len(which), np.int64))
-        deep = np.sqrt(squares) > DEEP_IN_PART * reach[doubted[which]]
-        compact |= few & (np.bincount(part[which], deep, len(doubted)) >= SHARE_DEEP * size)
+        living = np.flatnonzero(alive)
+        others = build_kd_tree(np.ascontiguousarray(near.tree.points[living]))
+        nearest_of_places(others, places, 1, squares, nearest)
+        away, own = np.sqrt(squares), reach[doubted[which]]
+        deep = np.bincount(part[which], away > DEEP_IN_PART * own, len(doubted))
+        compact |= few & (deep >= SHARE_DEEP * size)
+        beside_others = away < BESIDE_OTHERS * own
+        alike = beside_others & (own < GRADED_REACHES * reach[living[nearest]])
+        touching = np.bincount(part[which], beside_others, len(doubted))
+        compact |= (touching >= SMALLEST_PART) & (2 * np.bincount(part[which], alike, len(doubted)) > touching)
     found: np.ndarray = on & ((size >= SMALLEST_PART) & (edges <= OPEN_EDGE * size) | compact)[part]
     return found
 
