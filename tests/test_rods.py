@@ -162,6 +162,17 @@ def test_a_hall_is_tried_without_its_columns_right_after_the_first_grid(hall: tu
     assert all(attempt.settings.keep_rods for attempt in all_of_it)
 
 
+@pytest.mark.parametrize("step", [0.01, 0.012])
+def test_rows_of_a_scan_far_apart_are_no_rods(step: float) -> None:
+    """A roof from one position, its rows four times as far apart as the points in them: four fifths of it were left out as cables."""
+    rise, turn = np.meshgrid(np.arange(0.15, 1.45, 4.0 * step), np.arange(-np.pi, np.pi, step), indexing="ij")
+    x, y = 6.0 + 4.0 * np.tan(rise) * np.cos(turn), -8.0 + 4.0 * np.tan(rise) * np.sin(turn)
+    z = 6.0 + 0.03 * x * y + np.random.default_rng(0).normal(0.0, 0.004, x.shape)
+    roof = np.stack([x, y, z], axis=-1)[(np.abs(x) < 10.0) & (np.abs(y) < 9.0)]
+    samples = st.sample_surface(st.PointCloud.from_array(roof), st.Settings(length=2.7, keep_rods=False))
+    assert not (samples.judged == ROD).any()
+
+
 @pytest.mark.parametrize(("piece", "height"), [("2", (2.0, 6.5)), ("largest", (-0.2, 0.6)), ("1", (-0.2, 0.6))])
 def test_one_piece_is_taken_alone(hall: tuple[np.ndarray, np.ndarray], piece: str, height: tuple[float, float]) -> None:
     settings = st.Settings(length=LENGTH, effort="quick", keep_rods=False, piece=piece)

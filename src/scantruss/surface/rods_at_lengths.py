@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..scan.clean.thinning import number_in_boxes
 from .chosen_samples import Asked, radius_of_samples
 from .linked_samples import Linked, link_samples
-from .rods import lengths_of_rods, pieces_of_rods, rod_points
+from .rods import MOST_RODS, lengths_of_rods, pieces_of_rods, rod_points
 from .supports import free_columns, support_samples
 
 
@@ -25,7 +26,13 @@ def points_of_rods(points: np.ndarray, spacing: float, asked: Asked) -> np.ndarr
         rods[left[_rods_at(length, found, known, asked)]] = True
     if len(lengths) > 1 and rods.any():
         rods |= pieces_of_rods(finest, rods, radii[0], asked.length)
-    return rods if not rods.all() else np.zeros(len(points), np.bool_)  # then they are the scan itself
+    return rods if _share_of_surface(points, rods, radii[-1]) <= MOST_RODS else np.zeros(len(points), np.bool_)
+
+
+def _share_of_surface(points: np.ndarray, rods: np.ndarray, width: float) -> float:
+    """Return the share of boxes of a width [scan unit] whose points (N, 3) are mostly of rods (N,): of the area, however dense they are."""
+    box = number_in_boxes(points, width)
+    return float((2 * np.bincount(box, rods) > np.bincount(box)).mean())
 
 
 def _rods_at(length: float, found: Linked, column: np.ndarray, asked: Asked) -> np.ndarray:
