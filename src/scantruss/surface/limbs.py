@@ -37,6 +37,8 @@ FEWEST_ALONG_LINE = 5  # fewest samples that show that others lie along a line
 FEWEST_OF_LIMB = 12  # fewest samples of a part that is cut off
 BLUNT_END = 2.0  # least area of an end that is wider than a member [desired lengths^2]
 SURE_GIRTH = 0.95  # girth at the thinnest twentieth of a limb above which it is not cut off [girth below which limbs are cut off]
+BLUNT_GIRTH = 0.5  # the same of what is the end of a limb that stays
+BLUNT_NORMAL = 0.4  # mean normal above which it is such an end; half a ball has 0.5, a tube 0
 CLEAN_RING_SHARE = 0.8  # least share of the samples on each side of a ring that are on the right side
 NECK_GIRTH = 0.8  # girth down to which a neck before such an end stays [girth below which limbs are cut off]
 LOOKED_AROUND_RING = 0.4  # how far a ring is looked around for, beside its own radius [desired lengths]
@@ -227,7 +229,8 @@ class _Parts:
         rings: list[LimbRing] = []
         for limb in np.unique(whole[~stays]):
             gone = whole == limb
-            if self._thinnest(gone & self.thin) > SURE_GIRTH * self.limit:
+            blunt = np.linalg.norm(self.surface.normals[gone].mean(axis=0)) > BLUNT_NORMAL
+            if self._thinnest(gone & self.thin) > (BLUNT_GIRTH if blunt else SURE_GIRTH) * self.limit:
                 continue
             off = gone[self.owner]
             found = [self._rings_at(end, gone, off, at_body) for end in self._ends(gone)]
