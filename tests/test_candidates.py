@@ -304,7 +304,7 @@ def test_best_is_no_worse_than_normal_and_takes_part_only_where_that_passes(
 @compiled_only
 def test_a_grid_with_ridges_is_searched_on_and_is_in_no_figure_worse() -> None:
     gable = make("gable", 20_000)
-    settings = st.Settings(length=1.4 * gable.length)
+    settings = st.Settings(length=1.5 * gable.length)
     samples, boundary = find_boundary(sample_surface(st.PointCloud.from_array(gable.points), settings), settings)
     boundary, constraints = find_constraints(samples, boundary, settings)
     fields = orientation_fields(samples, boundary, settings)

@@ -24,8 +24,8 @@ MOST_ANGLE_RATIO = 1.3  # largest ratio of the angle of a corner to the angle be
 MEDIAN_TURN_RATIO = 1.7  # a corner turns at least this many times more than the median of its loop
 QUARTILE_TURN_RATIO = 1.8  # a corner turns at least this many times more than the upper quartile of its loop
 CERTAIN_TURN = 70.0  # a turn this large is a corner in any case [degree]
-# a loop no longer than this [member lengths] turns so much everywhere: if its points are this near to a circle [radii], it has no corner
-SHORT_LOOP, ROUND = 6.5, 0.05
+# a loop no longer than this turns much everywhere: it has no corner if its points lie off a circle by less than that (rms) [member lengths]
+SHORT_LOOP, OFF_CIRCLE = 6.5, 0.045
 
 
 def find_corners(curve: np.ndarray, settings: Settings, coarser: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
@@ -47,7 +47,7 @@ def find_corners(curve: np.ndarray, settings: Settings, coarser: float = 1.0) ->
     places : (C, 3) the corners
     """
     step = CURVE_STEP / coarser
-    if len(curve) < 2 * round(SIGHT_ALONG_CURVE[1] / step) + 2 or _is_round(curve):
+    if len(curve) < 2 * round(SIGHT_ALONG_CURVE[1] / step) + 2 or _is_round(curve, settings.length):
         return np.zeros(0, np.int64), np.zeros((0, 3))
     turn = _turns(curve, step)
     usual = max(MEDIAN_TURN_RATIO * float(np.median(turn)), QUARTILE_TURN_RATIO * float(np.quantile(turn, 0.75)))
@@ -63,14 +63,14 @@ def find_corners(curve: np.ndarray, settings: Settings, coarser: float = 1.0) ->
     return _apart(found, NEAREST_CORNERS * settings.length)
 
 
-def _is_round(curve: np.ndarray) -> bool:
+def _is_round(curve: np.ndarray, length: float) -> bool:
     """Whether a closed curve of equal steps (M, 3) is short and a circle but for little."""
     if len(curve) * CURVE_STEP > SHORT_LOOP:
         return False
     flat = (curve - curve.mean(axis=0)) @ np.linalg.svd(curve - curve.mean(axis=0), full_matrices=False)[2][:2].T
     found = np.linalg.lstsq(np.column_stack([flat, np.ones(len(flat))]), (flat**2).sum(axis=1), rcond=None)[0]
     radii = np.linalg.norm(flat - 0.5 * found[:2], axis=1)
-    return bool(radii.std() < ROUND * radii.mean())
+    return bool(radii.std() < OFF_CIRCLE * length)
 
 
 def _peaks(turn: np.ndarray, enough: float) -> np.ndarray:
