@@ -21,6 +21,7 @@ import scantruss as st
 from scantruss import pipeline
 from scantruss.attempts.limit import FAR_FROM_PASSING, MOST_RUNS, AttemptLimit
 from scantruss.attempts.table import Attempt
+from scantruss.boundary import find
 from scantruss.check.crossings import MOST_CROSSINGS
 from scantruss.cli.main import main
 from scantruss.errors import FrontError
@@ -634,3 +635,25 @@ def test_a_length_at_which_no_quick_run_passes_is_begun_as_grid_begins() -> None
     failed = LengthTrial(2.0, None, FrontError("no"), 3)
     assert settled(failed, cloud, settings, lambda *_: None).passed
     assert settled(replace(failed, paused=True), cloud, settings, lambda *_: None).fault is failed.fault
+
+
+def test_info_gives_the_boundaries_of_the_grid_that_passes(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As it is the scan may look one-sided: a body was refused after its length had been suggested."""
+    np.save(tmp_path / "plate.npy", sheet(12.0, 8.0, 0.25))
+    seen, look, tried = list[bool](), find.find_boundary, cast(property, vars(Advice)["tried"]).fget
+
+    def finds(samples: Any, settings: st.Settings, **more: Any) -> Any:
+        seen.append(settings.plain_body)
+        return look(samples, settings, **more)
+
+    def by_plain_body(advice: Advice) -> list[LengthTrial]:
+        grids = [(trial, trial.grid) for trial in known(tried)(advice)]
+        return [
+            trial if grid is None else replace(trial, grid=grid.replace(settings=known(grid.settings).replace(plain_body=True)))
+            for trial, grid in grids
+        ]  # fmt: skip
+
+    monkeypatch.setattr(find, "find_boundary", finds)
+    monkeypatch.setattr(Advice, "tried", property(by_plain_body))
+    assert main(["info", str(tmp_path / "plate.npy")]) == 0
+    assert seen[-1]

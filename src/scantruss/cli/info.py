@@ -68,7 +68,10 @@ def info(values: Namespace) -> None:
                 print_lines(advice_lines(advice, length, cloud))
                 if not advice.passes and (words := words_of_floor(bars, cloud, settings.replace(length=length))):
                     print_lines([words.removeprefix("; ")])
-                settings = advice.settings.replace(length=length)
+                # a scan that looks one-sided as it is has the boundaries of the grid that passes
+                passing = [trial.grid for trial in advice.tried if trial.passed and trial.length == length]
+                made = passing[0].settings if passing and passing[0] is not None else None
+                settings = (made or advice.settings).replace(length=length, effort=settings.effort)
             samples, boundary = find_boundary(sample_surface(cloud, settings), settings, progress=bars)
         note_outliers(bars, cloud, settings, "scantruss grid")
         note_layers(bars, cloud, settings)
