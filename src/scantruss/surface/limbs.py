@@ -16,6 +16,7 @@ from ..kernels.surface.local_surface import Surface, flood
 from ..kernels.surface.rods import spreads_around
 from ..runtime.parallel import run_in_parts
 from .given_normals import GivenNormals
+from .owners import far_from_rest
 from .pieces import LEAST_TRIANGLES, TRIANGLE_AREA, sample_areas
 from .rods import line_like
 from .tubes import (
@@ -99,24 +100,12 @@ def cut_limbs(
     if parts is None:
         return none
     gone, rings = parts.cut()
-    if _far_from_rest(points, which[gone], owner, surface) > allow_missing * len(points):
+    if far_from_rest(points, which[gone], owner, surface) > allow_missing * len(points):
         gone, rings = parts.cut(at_body=False)
     if not gone.any() or gone.sum() > MOST_OF_SCAN_THIN * len(points):
         return none
     none[0][which[gone]] = True
     return none[0], rings
-
-
-def _far_from_rest(points: np.ndarray, gone: np.ndarray, owner: np.ndarray, surface: Surface) -> int:
-    """Return how many of the points (N, 3) of samples (N,) that are cut off (K,) lie more than half a member from the rest."""
-    from scipy.spatial import cKDTree
-
-    owned = owner[owner >= 0]
-    rest = 2 * np.bincount(owner[gone], minlength=len(surface.mean)) <= np.bincount(owned, minlength=len(surface.mean))
-    if not len(gone) or not rest.any():
-        return len(gone)
-    away = cKDTree(surface.mean[rest]).query(points[gone])[0]
-    return int((away > 0.5 * surface.length * surface.field[owner[gone]]).sum())
 
 
 def _suspects(surface: Surface, boxes: SearchBoxes, girth: float, smooth: bool) -> np.ndarray:
@@ -163,9 +152,8 @@ class _Parts:
     limit: float  #: girth below which limbs are cut off [desired lengths]
     label: np.ndarray  #: (S,) number of the part of each sample
     thin: np.ndarray  #: (S,) bool
-    reached: (
-        np.ndarray
-    )  #: (S,) step in which each was found to be thin, by following a limb to the body; else 0, or less
+    #: (S,) step in which each was found to be thin, by following a limb to the body; else 0, or less
+    reached: np.ndarray
     solid: np.ndarray  #: (S,) bool, of a part that is no end of a limb
     body: np.ndarray  #: (S,) number of the rest of the scan that is linked to each, -1 where it is linked to none
 
