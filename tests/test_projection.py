@@ -34,7 +34,7 @@ def test_noise_is_averaged_at_a_rim_too_and_moves_corners_little(name: str) -> N
     At a corner it has a quarter of them, so nothing is averaged there, but the noise is hardly made larger either.
     """
     inside, curves, corners = [], [], []
-    for seed in range(3):
+    for seed in range(6):
         shape = make(name, 100_000, seed=seed, noise=0.01 * make(name).length)
         grid = st.grid_from_points(shape.points, st.Settings(length=shape.length, effort="quick"))
         nodes = grid.nodes + grid.origin

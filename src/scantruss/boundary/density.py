@@ -24,6 +24,7 @@ class SlidingDisc(NamedTuple):
     least: float  #: its radius where points are dense [scan unit]
     widest: float  #: and where they are sparse [scan unit]
     reach: float  #: distance from a place within which points are counted [scan unit]
+    length: float  #: desired member length [scan unit]
 
     def radii(self, density: np.ndarray) -> np.ndarray:
         """Return its radius (M,) at places with so many points to an area (M,) [scan unit]."""
@@ -36,7 +37,7 @@ def disc_beside(samples: SurfaceSamples, surface: Surface, radius: float, *, wid
     reach = reach_of_density(surface, samples.area)
     if samples.whole is not None:  # all its points are there only so near to the boundary
         reach = min(reach, BESIDE_SAMPLES * samples.sample_spacing)
-    return SlidingDisc(least, max(least, radius) if widens else least, reach)
+    return SlidingDisc(least, max(least, radius) if widens else least, reach, surface.length)
 
 
 def reach_of_density(surface: Surface, area: float) -> float:

@@ -56,8 +56,8 @@ class SamplingBias:
         if self.disc is None:
             return np.full(len(curve), self.beyond), np.full(len(curve), self.density)
         density = density_along(surface, curve, self.disc.reach)
-        mean = mean_beyond(self.density, self.disc)
-        return self.beyond / mean * mean_beyond(density, self.disc), density
+        share = mean_beyond(density, self.disc) / mean_beyond(self.density, self.disc)
+        return self.beyond * share, density
 
 
 NO_BIAS = SamplingBias(0.0, np.inf)  # what method "paper" assumes
@@ -69,7 +69,8 @@ def mean_beyond(density: np.ndarray | float, disc: SlidingDisc) -> np.ndarray:
     For the density rho and a disc of radius r it is `MEAN_BEYOND` rho^(-2/3) r^(-1/3): the disc enters to the depth h at which the
     segment inside the surface, of area (4/3) (2 r)^(1/2) h^(3/2), holds about one point.
     """
-    found: np.ndarray = MEAN_BEYOND * np.asarray(density) ** (-2 / 3) * disc.radii(np.asarray(density)) ** (-1 / 3)
+    in_member, radii = np.asarray(density) * disc.length**2, disc.radii(np.asarray(density)) / disc.length
+    found: np.ndarray = MEAN_BEYOND * disc.length * in_member ** (-2 / 3) * radii ** (-1 / 3)
     return found
 
 

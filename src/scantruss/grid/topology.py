@@ -50,8 +50,10 @@ def _sheets(grid: GridTables) -> np.ndarray:
 def _is_orientable(grid: GridTables) -> bool:
     """Whether the triangles can be turned so that neighbours run along their edge in opposite directions.
 
-    The grid is one-sided if a triangle is joined with itself turned over.
+    The grid is one-sided if a triangle is joined with itself turned over, as always where an edge has three.
     """
+    if (grid.edge_uses > 2).any():
+        return False
     label, count = _sheets(grid), len(grid.triangles)
     return not np.any(label[:count] == label[count:])
 
