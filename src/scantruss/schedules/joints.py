@@ -84,7 +84,7 @@ def check_grid(grid: Grid) -> None:
     if len(grid.edges) == 0:
         raise InputError("the grid has no members, so there is nothing to schedule; give one with a triangle at least")
     if not (grid.topology.manifold and grid.topology.orientable):
-        words = "not manifold" if grid.topology.orientable else "one-sided"
+        words = "one-sided" if grid.topology.manifold else "not manifold"
         raise InputError(
             f"the grid is {words}, so its nodes have no outer side; schedules need one that passes its certificate"
         )

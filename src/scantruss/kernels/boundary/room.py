@@ -10,7 +10,7 @@ from ..geometry.vectors import Vector, along, cross, dot, norm, row, subtract, u
 from ..surface.local_surface import Surface, flood, walk
 
 SHEET_SINE = 0.4  # sine of the angle above the mean plane of two places, beyond which they lie on two sheets
-ON_CURVE = 1e-6  # distance from a curve up to which a point lies on it, whatever the rounding [reaches]
+BESIDE_CURVE = 1e-6  # distance from a curve up to which a point lies on it, whatever the rounding [reaches]
 ONE_SHEET_COSINE = -0.5  # cosine between the normals of two places, above which they may lie on one sheet
 
 
@@ -118,5 +118,5 @@ def points_beside(
             s = surface.queue[i]
             for p in range(surface.start[s], surface.start[s + 1]):
                 d = subtract(row(surface.points, p), place)
-                inside += dot(d, d) <= reach * reach and dot(d, outwards) < -ON_CURVE * reach
+                inside += dot(d, d) <= reach * reach and dot(d, outwards) < -BESIDE_CURVE * reach
         counts[m] = inside
