@@ -84,3 +84,6 @@ def test_the_warning_names_length_ends_and_middle_of_each_part() -> None:
     assert warning.words.endswith("from (1, 0, 0) to (9, 0, 0)")
     assert warning.where == (5.0, 0.0, 0.0) and warning.also == ((20.5, 0.0, 0.0),)
     assert with_ridges_given_up(grid, []) is grid
+    ring = np.concatenate([long, long[:1]])
+    (warning,) = known(with_ridges_given_up(grid, [ring]).certificate).warnings
+    assert warning.words.endswith(": 16 m in a ring through (1, 0, 0)")

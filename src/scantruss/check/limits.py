@@ -182,7 +182,7 @@ def _with_ridges(grid: Grid, parts: Sequence[np.ndarray], said: str, kind: str =
     whole, of_longest = (words_of_number(each, 3) for each in (sum(map(length_along, parts)), length_along(longest)))
     more = f" in {len(parts)} parts, the longest {of_longest}{unit}," if len(parts) > 1 else ""
     first, last = (words_of_place(longest[end]) for end in (0, -1))
-    ends = f"from ({first}) to ({last})" if first != last else f"around from ({first})"
+    ends = f"from ({first}) to ({last})" if first != last else f"in a ring through ({first})"
     words = f"{said}: {whole}{unit}{more} {ends}{advice}"
     at, *others = (place_of(part[len(part) // 2]) for part in parts[:PLACES_KEPT])
     warning = Fault(kind, words, at, tuple(others))

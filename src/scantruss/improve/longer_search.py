@@ -96,8 +96,10 @@ def _at_rest(net: Net, which: np.ndarray) -> Iterator[None]:
     moving = which & (net.degree > 0) & (net.kind < AT_REST)
     kinds = net.kind[moving]
     net.kind[moving] = AT_REST
-    yield
-    net.kind[moving] = kinds
+    try:
+        yield
+    finally:
+        net.kind[moving] = kinds
 
 
 def _is_no_poorer(now: Judged, first: Judged) -> bool:

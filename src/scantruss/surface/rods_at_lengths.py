@@ -26,7 +26,9 @@ def points_of_rods(points: np.ndarray, spacing: float, asked: Asked) -> np.ndarr
         rods[left[_rods_at(length, found, known, asked)]] = True
     if len(lengths) > 1 and rods.any():
         rods |= pieces_of_rods(finest, rods, radii[0], asked.length)
-    return rods if _share_of_surface(points, rods, 2.0 * radii[-1]) <= MOST_RODS else np.zeros(len(points), np.bool_)
+    if rods.any() and _share_of_surface(points, rods, 2.0 * radii[-1]) > MOST_RODS:  # then they are the scan itself
+        rods[:] = False
+    return rods
 
 
 def _share_of_surface(points: np.ndarray, rods: np.ndarray, width: float) -> float:
