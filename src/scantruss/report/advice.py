@@ -145,7 +145,7 @@ class Advice:
         those that pass with what is next above them the first that loses hardly more than the least; else the next below one that
         passes, if it passes too; else one that passes, if there is one with another not far above it that passes too; else the usual
         length. Where none passes, longer ones are looked at once more, then those beside the usual one. One that closes openings or
-        loses ridges gives way to the next below it, if that passes, does neither more and loses no more.
+        loses ridges gives way to the next shorter one that does not, if that passes and loses no more.
         """
         self.is_spent = True
         low, high = length_range(self._cloud)
@@ -169,7 +169,8 @@ class Advice:
         if both:
             least = min(both.values())
             most_lost = max(least + ladder.LOST_ALIKE, ladder.LOST_ALIKE_SHARE * least)
-            return self._losing_less(next(length for length, lost in both.items() if lost <= most_lost))
+            length = self._losing_less(next(length for length, lost in both.items() if lost <= most_lost))
+            return self._following_more(self._found[length])
         if not self.passes:
             self._try_longer()
         if not self.passes:
@@ -203,8 +204,8 @@ class Advice:
     def _following_more(self, trial: LengthTrial) -> float:
         """Return the length of a trial that passes, or a shorter one if that follows what this one does not, and loses no more.
 
-        That is openings which this one closes, or ridges which it loses. Lengths between may not pass, as those too long for
-        steps and too short for the slope along them.
+        That is openings which this one closes, or ridges which it loses. Lengths between may follow no more, or not pass, as those
+        too long for steps and too short for the slope along them.
         """
         if not trial.follows_less:
             return trial.length
@@ -213,17 +214,12 @@ class Advice:
         for _ in range(ladder.STEPS_TO_FOLLOW):
             below = self.next_below(above.length)
             shorter = self.try_length(below, ladder.FIRST_TWO) if below < above.length else None
-            if shorter is None or (shorter.passed and not self._follows_more(shorter, trial)):
+            if shorter is None or (shorter.passed and shorter.lost > trial.lost + ladder.LOST_ALIKE):
                 break
-            if shorter.passed and above.passed:
+            if shorter.passed and above.passed and shorter.follows_less < trial.follows_less:
                 return below
             above = shorter
         return trial.length
-
-    @staticmethod
-    def _follows_more(shorter: LengthTrial, trial: LengthTrial) -> bool:
-        """Whether one of two trials that pass follows what the other does not, and loses no more."""
-        return shorter.follows_less < trial.follows_less and shorter.lost <= trial.lost + ladder.LOST_ALIKE
 
     def _try_longer(self) -> None:
         """Try longer lengths than the usual one until one passes, with the grids of the table: columns are then seen for what they are.
@@ -303,20 +299,20 @@ class Advice:
             lengths.add(sure)
         self._count_at(at, ladder.MOST_TRIED)
         for most in (ladder.FIRST_TWO, ladder.A_FEW, ladder.SOME_MORE):
-            hopeless = 0  # lengths in a row
+            hopeless = {True: 0, False: 0}  # shorter and longer lengths in a row
             for each in sorted(lengths, key=lambda other: (abs(np.log(other / length)), other)):
-                if each > self._too_long or hopeless == ladder.HOPELESS_NEARBY:
+                is_shorter = each < length
+                if each > self._too_long or hopeless[is_shorter] == ladder.HOPELESS_NEARBY:
                     continue
                 trial = self.try_length(each, most=most)
                 if trial is not None and trial.passed:
                     return trial.length
-                hopeless = hopeless + 1 if each in self._begun and self._begun[each][2].all_hopeless else 0
-            if hopeless == ladder.HOPELESS_NEARBY:
+                is_hopeless = each in self._begun and self._begun[each][2].all_hopeless
+                hopeless[is_shorter] = hopeless[is_shorter] + 1 if is_hopeless else 0
+            if min(hopeless.values()) == ladder.HOPELESS_NEARBY:
                 break
-        if not min(lengths, default=at) <= self._usual <= max(lengths, default=at):  # then this is cheap, or worth it
-            usual = self._usual_if_it_passes()
-            return None if usual is None else self._nearer(usual, at)
-        return None
+        usual = self._usual_if_it_passes()
+        return None if usual is None else self._nearer(usual, at)
 
     def _note_lost_limbs(self, length: float, fault: ScanTrussError) -> None:
         """Note a length at which more of the scan than may be missing is on limbs too thin for its members."""

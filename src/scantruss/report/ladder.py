@@ -47,13 +47,13 @@ POINTS_LOOKED_AT = 2_000_000  # points that are looked at for that
 LEAST_TRIED = 5.0  # grids that are made for that even where the scan has more points
 TRIED_AROUND = 6.0  # grids that are made besides for the lengths of the table, one each
 TRIED_LONGER = 2  # grids that are made of each longer length where no other has passed, of those for the table
-TRIED_USUAL = 4.0  # grids that are made at the usual length where no length nearby passes and it is far away
+TRIED_USUAL = 4.0  # grids that are made at the usual length where no length nearby passes
 FAR_TOO_SHORT = 0.2  # share of the shortest possible length below which the usual one is looked at alone: that length is in another unit
 POINTS_PER_MEMBER = 9  # points that cost as much as a member of the grid
 MOST_MEMBERS = 60_000  # members of a grid that is made to try a length
 CLOSE_BEND = 0.95  # share of the scan that is less bent than the radius that is named
-# lengths one after the other, all of whose grids are far from passing or fail by their fronts, after which no other nearby is tried
-HOPELESS_NEARBY = 4
+# lengths one after the other, all of whose grids are far from passing or fail by their fronts, beyond which no other nearby is tried
+HOPELESS_NEARBY = 3
 # lengths that were tried from which on only longer ones are looked at where there is no hope for any
 HOPELESS_LENGTHS = 3
 # lengths that are tried beside the usual one where none of these passes, as multiples of it
