@@ -17,7 +17,7 @@ from .density import SlidingDisc, density_along, reach_of_density
 
 STEPS_BACK = 16  # a boundary point touched again within this many steps was never left
 # share of a loop's places from which the disc reaches no point, above which they are replaced, and how many times at most
-OUT_OF_DISC, MOST_REPLACED = 0.02, 3
+OUT_OF_DISC, MOST_REPLACED = 0.05, 3
 PLACES_PER_THREAD = 500  # fewest places of a loop that are worth a thread
 
 

@@ -276,7 +276,7 @@ def touch_points(
     noise = 0.35 * surface.length
     for m in range(begin, end):
         sample, place, radius = samples[m], row(places, m), radii[m]
-        across = surface.radius + radius
+        across = surface.radius + 1.5 * radius
         normal = row(surface.normals, sample)
         out = unit(cross(row(ahead, m), normal))
         side = cross(normal, out)
