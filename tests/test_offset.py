@@ -269,6 +269,16 @@ def test_where_random_points_leave_the_corners_in_doubt_it_is_said_with_a_length
             assert "may be none" not in capsys.readouterr().err
 
 
+def test_where_a_boundary_is_sparse_is_said_though_most_of_it_is_dense() -> None:
+    """A plate of 18 by 6 members, a fifth of it with 4 points to a member square: elsewhere there are 100."""
+    rng = np.random.default_rng(7)
+    dense, sparse = rng.uniform((0.0, 0.0), (14.4, 6.0), (8640, 2)), rng.uniform((14.4, 0.0), (18.0, 6.0), (86, 2))
+    boundary, origin = boundary_of(np.pad(np.concatenate([dense, sparse]), ((0, 0), (0, 1))))
+    (loop,) = boundary.loops
+    assert loop.beyond > 2.0 * module.CORNERS_SHOW_TO
+    assert (loop.points + origin)[loop.sparse_at, 0] > 14.0
+
+
 @pytest.mark.parametrize("radius", [0.5, 0.55, 0.6])
 @pytest.mark.parametrize("waves", [2, 3])
 def test_a_small_round_opening_has_no_corners(radius: float, waves: int) -> None:

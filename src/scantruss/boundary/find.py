@@ -36,6 +36,7 @@ LEAST_OPEN_SHARE = 0.6  # share of a loop that must have room for a disc outside
 NEARLY_CLOSED = 10.0
 # distance from a ring where a limb was cut off within which a loop of the scan is that ring [member lengths]
 AT_RING = 0.6
+SPARSE_PART = 0.9  # quantile of the distance of the edge from the points, along a loop, that is said
 # farthest that the boundary of a hole passes a place that names it [member lengths]
 AT_HOLE = 1.0
 
@@ -52,7 +53,9 @@ class Loop:
     desired: np.ndarray | None = None  #: (M,) desired length at each point, in lengths; None if it is the same for all
     line_at: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))  #: points of the curve where lines end
     cut: str = ""  #: close or open where a limb was cut off, as the settings say
-    beyond: float = 0.0  #: how far the edge of the surface lies beyond the outermost points on the mean [scan unit]
+    #: how far the edge of the surface lies beyond the outermost points on the mean where they are sparse [scan unit], and where that is
+    beyond: float = 0.0
+    sparse_at: int = 0
 
     @property
     def corners(self) -> np.ndarray:
@@ -331,7 +334,9 @@ def smooth_loop(curve: np.ndarray, piece: int, bias: SamplingBias, settings: Set
     in_lengths = length if field is None else float((_steps(smoothed) / _between(field)).sum())
     if (in_lengths if settings.fill_holes is None else length) < settings.bridged_boundary_length:
         return None
-    return Loop(smoothed, corner_at, False, length, piece, field, beyond=bias.beyond)
+    beyond = bias.along(surface, smoothed)[0]
+    sparse = float(np.quantile(beyond, SPARSE_PART))
+    return Loop(smoothed, corner_at, False, length, piece, field, beyond=sparse, sparse_at=int(beyond.argmax()))
 
 
 def field_along(surface: Surface, curve: np.ndarray) -> np.ndarray | None:

@@ -12,6 +12,7 @@ from ..settings import Settings
 from .corners import CURVE_STEP, find_corners
 from .curves import heights_along, outward, resample, room_across, runs_around, smooth_between
 from .density import SlidingDisc, density_along
+from .four_sides import corners_of_four_sides
 
 SMOOTHING_WINDOW = 0.5  # half width of the window in which the curve is always smoothed [member lengths]
 # half widths of wider windows, used where random sampling explains how far they move the curve [member lengths]
@@ -102,7 +103,7 @@ def offset_curve(
     """
     if bias.beyond == 0.0:
         (narrow,), corner_at = smooth_between(
-            curve, *find_corners(curve, settings), [round(SMOOTHING_WINDOW / CURVE_STEP)]
+            curve, *_corners(curve, bias, np.zeros(0), settings, surface), [round(SMOOTHING_WINDOW / CURVE_STEP)]
         )
         return narrow, corner_at
     step = CURVE_STEP * settings.length
@@ -110,7 +111,7 @@ def offset_curve(
     beyond, density = bias.along(surface, curve)
     room = OFFSET_SHARE * room_across(curve, ROOM_ACROSS * settings.length, step)
     curve = curve + np.minimum(OFFSET_OF_BIAS * beyond, room)[:, None] * outward(surface, curve)
-    at, places = _corners(curve, bias.beyond, density, settings, surface)
+    at, places = _corners(curve, bias, density, settings, surface)
     halves = [
         round(SMOOTHING_WINDOW / CURVE_STEP),
         *(min(round(wide / CURVE_STEP), len(curve) // CURVE_PARTS) for wide in WIDER_WINDOWS),
@@ -187,12 +188,16 @@ def length_that_shows_corners(beyond: float, length: float) -> float:
 
 
 def _corners(
-    curve: np.ndarray, beyond: float, density: np.ndarray, settings: Settings, surface: Surface
+    curve: np.ndarray, bias: SamplingBias, density: np.ndarray, settings: Settings, surface: Surface
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return where a curve along random points has corners, and their places; not those in bays that random sampling explains."""
-    coarser = min(max(beyond / (CORNERS_SHOW_TO * settings.length), 1.0), COARSEST_CORNERS)
+    """Return where a curve through boundary points has corners, and their places; not those in bays that random sampling explains."""
+    four = corners_of_four_sides(curve, surface, bias.density)
+    if len(four):
+        at = np.linalg.norm(curve[:, None] - four, axis=2).argmin(axis=0)
+        return np.sort(at), four[at.argsort()]
+    coarser = min(max(bias.beyond / (CORNERS_SHOW_TO * settings.length), 1.0), COARSEST_CORNERS)
     at, places = find_corners(curve, settings, coarser)
-    if len(at) == 0:
+    if len(at) == 0 or bias.beyond == 0.0:
         return at, places
     kept = bays_at(curve, at, outward(surface, curve)) * density[at] > POINTS_OF_EMPTY_BAY
     return at[kept], places[kept]

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..errors import unit_words, words_of_number
+from ..errors import unit_words, words_of_number, words_of_place
 
 if TYPE_CHECKING:
     import numpy as np
@@ -163,13 +163,16 @@ def note_corners(bars: Bars, cloud: PointCloud, settings: Settings) -> None:
     if settings.boundary:
         return
     _, boundary = find_boundary(sample_surface(cloud, settings), settings)
-    beyond = max((loop.beyond for loop in boundary.external), default=0.0)
-    length, unit = length_that_shows_corners(beyond, settings.length), unit_words(cloud.unit)
+    worst = max(boundary.loops, key=lambda loop: loop.beyond, default=None)
+    if worst is None:
+        return
+    length, unit = length_that_shows_corners(worst.beyond, settings.length), unit_words(cloud.unit)
     if length > settings.length:
+        where = words_of_place(cloud.origin + worst.points[worst.sparse_at])
         bars.note(
-            f"the points are random and end on average {words_of_number(beyond, 2)}{unit} before the boundary, so"
-            f" corners may be missed or false; longer members, from {round_length(length, 'up'):g}{unit}, show them better,"
-            " and --boundary gives them"
+            f"the points are random and sparse: near {where} they end on average about {words_of_number(worst.beyond, 2)}{unit}"
+            f" before the boundary, so corners may be missed or false; longer members, from {round_length(length, 'up'):g}{unit},"
+            " show them better, and --boundary gives them"
         )
 
 
