@@ -12,7 +12,7 @@ from typed import known
 
 import scantruss as st
 from scantruss.check.left_out import _beyond_cut
-from scantruss.check.sheets import broken_limb, handle_left_in_part
+from scantruss.check.sheets import broken_limb, webbed_limb
 from scantruss.cli.main import main
 from scantruss.kernels.surface.girths import FACING_OPPOSITE, follow_girths, mark_opposite, measure_girths
 from scantruss.surface.chosen_samples import KEPT, LIMB
@@ -232,18 +232,20 @@ def test_a_handle_is_broken_where_a_part_of_it_is_missed_between_two_that_are_fo
 
 
 def test_a_handle_is_followed_whole_or_not_at_all() -> None:
-    """A cup passed with a stub of a member and a half where the rest of its handle was taken for a limb."""
-    points = handle(2.3)
-    cut, samples = samples_of(points, allow_missing=0.2), samples_of(points, limb_girth=0.0)
+    """A cup passed with a stub of a member and a half of its handle, an amphora with webs of triangles."""
+    points, thin = handle(2.3), handle(1.2)
     away = np.linalg.norm(points, axis=1) - 4.0
-    missed = (points[:, 0] > 0.0) & (points[:, 1] > -0.5) & (away > 0.3)
 
-    def left(off: np.ndarray) -> Any:
-        return handle_left_in_part(samples, cut, np.where(off, 1.5, 0.0), 1.0)
+    def wrong(points: np.ndarray, missed: np.ndarray) -> Any:
+        cut, samples = samples_of(points), samples_of(points, limb_girth=0.0)
+        return webbed_limb(samples, cut, np.where(missed, 1.5, 0.0), 1.0, 0.5)
 
-    assert left(missed & (np.arctan2(points[:, 1], points[:, 0] - 4.0) > 0.3)) is not None
-    assert left((points[:, 0] > 0.0) & (away > 0.1)) is None
-    assert left(np.zeros(len(points), bool)) is None
+    along = np.arctan2(points[:, 1], points[:, 0] - 4.0)  # along the handle, 0 at its middle
+    on_handle = (points[:, 0] > 0.0) & (away > 0.1)
+    assert wrong(points, on_handle & (along > 0.3)) is not None
+    assert wrong(points, on_handle) is None
+    assert wrong(points, np.zeros(len(points), bool)) is None
+    assert wrong(thin, np.zeros(len(thin), bool)) is not None  # no tube of three members goes around
 
 
 def test_a_limb_that_ends_sooner_is_not_broken() -> None:

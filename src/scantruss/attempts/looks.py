@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..check.distances import measure_distances
-from ..check.sheets import broken_limb, handle_left_in_part
+from ..check.sheets import broken_limb, webbed_limb
 from ..constraints.ridges import find_ridges
 from ..front.orientation_field import usual_starts
 from ..surface.chosen_samples import KEPT, LIMB, ROD
@@ -204,7 +204,10 @@ def breaks_limb(grid: Grid, cloud: PointCloud, asked: Settings, settings: Settin
     if not limb.any():
         return None
     away = measure_distances(grid, samples, settings.length).scan
-    return broken_limb(samples, limb, away, settings.length) or handle_left_in_part(samples, cut, away, settings.length)
+    shortest = settings.min_length * settings.length
+    return broken_limb(samples, limb, away, settings.length) or webbed_limb(
+        samples, cut, away, settings.length, shortest
+    )
 
 
 def stands_on_columns(cloud: PointCloud, settings: Settings) -> bool:

@@ -109,16 +109,17 @@ def broken_limb(samples: SurfaceSamples, limb: np.ndarray, distance: np.ndarray,
     return None
 
 
-def handle_left_in_part(
-    samples: SurfaceSamples, cut: SurfaceSamples, distance: np.ndarray, length: float
+def webbed_limb(
+    samples: SurfaceSamples, cut: SurfaceSamples, distance: np.ndarray, length: float, shortest: float
 ) -> Place | None:
-    """Return a place where a grid misses a part of a handle by more than a member and follows a stub of it; None where there is none.
+    """Return a place where a grid follows a limb that no tube of members goes around, or a stub of a handle that it misses; or None.
 
     Parameters
     ----------
     samples : of the grid
     cut : of the same scan, with all limbs cut off that are too thin for the members: a handle at two rings or more
     distance : (N,) of each point from the grid [scan unit]
+    shortest : length of the shortest member, of which three go around a tube at least [scan unit]
     """
     from scipy.spatial import cKDTree
 
@@ -128,11 +129,14 @@ def handle_left_in_part(
     off_body, _ = cKDTree(cut.scan[cut.judged == KEPT]).query(cut.scan[limb])
     followed = (samples.judged[limb] == KEPT) & (distance[limb] < FOLLOWED_BY_STUB * length)
     stub = followed & (off_body > LENGTH_OF_STUB * length)
-    for handle in np.flatnonzero(np.bincount(group[nearest]) > 1):
-        missed = limb[(group == handle) & (distance[limb] > length)]
-        if len(missed) and (stub & (group == handle)).sum() >= FEWEST_BESIDE_BREAK:
-            middle = samples.scan[missed]
-            return place_of(middle[((middle - middle.mean(axis=0)) ** 2).sum(axis=1).argmin()] + samples.origin)
+    for each in np.unique(group[nearest]):
+        rings = [ring for ring, at in zip(cut.rings, group[nearest], strict=True) if at == each]
+        own = group == each
+        is_thin, missed = min(ring.girth for ring in rings) < 3.0 * shortest, own & (distance[limb] > length)
+        wrong = limb[stub & own] if is_thin else limb[missed] if len(rings) > 1 else limb[:0]
+        if len(wrong) and (stub & own).sum() >= FEWEST_BESIDE_BREAK:
+            places = samples.scan[wrong]
+            return place_of(places[((places - places.mean(axis=0)) ** 2).sum(axis=1).argmin()] + samples.origin)
     return None
 
 
