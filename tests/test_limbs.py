@@ -238,7 +238,7 @@ def test_a_handle_is_followed_whole_or_not_at_all() -> None:
 
     def wrong(points: np.ndarray, missed: np.ndarray) -> Any:
         cut, samples = samples_of(points), samples_of(points, limb_girth=0.0)
-        return webbed_limb(samples, cut, np.where(missed, 1.5, 0.0), 1.0, 0.5)
+        return webbed_limb(samples, cut, np.where(missed, 0.6, 0.0), 1.0, 0.5)
 
     along = np.arctan2(points[:, 1], points[:, 0] - 4.0)  # along the handle, 0 at its middle
     on_handle = (points[:, 0] > 0.0) & (away > 0.1)

@@ -13,6 +13,7 @@ from ..surface.chosen_samples import KEPT, LIMB
 from ..surface.near_scan import distance_from_scan
 from ..surface.scratch import with_own_scratch
 from .left_out import LIMBS_APART, points_together
+from .limits import COVER_REACH
 
 if TYPE_CHECKING:
     from ..errors import Place
@@ -112,7 +113,7 @@ def broken_limb(samples: SurfaceSamples, limb: np.ndarray, distance: np.ndarray,
 def webbed_limb(
     samples: SurfaceSamples, cut: SurfaceSamples, distance: np.ndarray, length: float, shortest: float
 ) -> Place | None:
-    """Return a place where a grid follows a limb that no tube of members goes around, or a stub of a handle that it misses; or None.
+    """Return a place where a grid follows a limb that no tube of members goes around, or only a stub of a handle; None where there is none.
 
     Parameters
     ----------
@@ -132,9 +133,12 @@ def webbed_limb(
     for each in np.unique(group[nearest]):
         rings = [ring for ring, at in zip(cut.rings, group[nearest], strict=True) if at == each]
         own = group == each
-        is_thin, missed = min(ring.girth for ring in rings) < 3.0 * shortest, own & (distance[limb] > length)
+        is_thin, missed = (
+            min(ring.girth for ring in rings) < 3.0 * shortest,
+            own & (distance[limb] > COVER_REACH * length),
+        )
         wrong = limb[stub & own] if is_thin else limb[missed] if len(rings) > 1 else limb[:0]
-        if len(wrong) and (stub & own).sum() >= FEWEST_BESIDE_BREAK:
+        if min(len(wrong), (stub & own).sum()) >= FEWEST_BESIDE_BREAK:
             places = samples.scan[wrong]
             return place_of(places[((places - places.mean(axis=0)) ** 2).sum(axis=1).argmin()] + samples.origin)
     return None
