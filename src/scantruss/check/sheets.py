@@ -133,10 +133,8 @@ def webbed_limb(
     for each in np.unique(group[nearest]):
         rings = [ring for ring, at in zip(cut.rings, group[nearest], strict=True) if at == each]
         own = group == each
-        is_thin, missed = (
-            min(ring.girth for ring in rings) < 3.0 * shortest,
-            own & (distance[limb] > COVER_REACH * length),
-        )
+        is_thin = min(ring.girth for ring in rings) < 3.0 * shortest
+        missed = own & (distance[limb] > COVER_REACH * length)
         wrong = limb[stub & own] if is_thin else limb[missed] if len(rings) > 1 else limb[:0]
         if min(len(wrong), (stub & own).sum()) >= FEWEST_BESIDE_BREAK:
             places = samples.scan[wrong]
