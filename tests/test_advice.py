@@ -339,7 +339,9 @@ def test_of_lengths_that_lose_about_as_much_the_usual_one_is_suggested(monkeypat
 
     def tried(advice: Advice, length: float, most: int = 0) -> LengthTrial:
         lost = 0.033 if length >= advice._usual else least
-        return LengthTrial(length, cast(Any, SimpleNamespace(certificate=SimpleNamespace(judged_out=lost))))
+        certificate = SimpleNamespace(judged_out=lost, left_out=(), warnings=())
+        trial = advice._found[length] = LengthTrial(length, cast(Any, SimpleNamespace(certificate=certificate)))
+        return trial
 
     monkeypatch.setattr(Advice, "try_length", tried)
     advice = Advice(cloud_of("limpet"), st.Settings(length=1.0))
@@ -359,7 +361,8 @@ def test_a_length_that_loses_little_is_suggested_where_the_next_above_passes_at_
     """As of a range scan in pieces: longer members leave some of them out."""
 
     def tried(advice: Advice, length: float, most: int = 0) -> LengthTrial:
-        certificate = SimpleNamespace(judged_out=0.002 if length < 1.7 * advice._usual else 0.03)
+        lost = 0.002 if length < 1.7 * advice._usual else 0.03
+        certificate = SimpleNamespace(judged_out=lost, left_out=(), warnings=())
         share = length / advice._usual
         passes = 0.95 < share < 1.1 or share > 1.7 or (at_last and share > 1.1 and most == MOST_RUNS)
         grid = cast(Any, SimpleNamespace(certificate=certificate)) if passes else None
@@ -477,6 +480,24 @@ def test_a_length_that_loses_ridges_gives_way_to_one_that_follows_them_below_len
     for _ in range(steps):
         wanted = advice.next_below(wanted)
     assert advice.suggest() == wanted
+
+
+@pytest.mark.parametrize("columns", [0.0, 0.12])
+def test_a_length_that_closes_openings_gives_way_beyond_one_that_follows_no_more(
+    columns: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """So it does where columns are left out, which are lost at every length."""
+
+    def tried(advice: Advice, length: float, most: int = 0) -> LengthTrial:
+        hole = SimpleNamespace(kind="hole", asked=False, size=2.0 * length)
+        found = SimpleNamespace(judged_out=columns, left_out=(hole,) * (length > 0.6 * advice._usual), warnings=())
+        trial = advice._found[length] = LengthTrial(length, cast(Any, SimpleNamespace(certificate=found)))
+        return trial
+
+    monkeypatch.setattr(Advice, "try_length", tried)
+    advice = Advice(st.PointCloud.from_array(sheet(16, 16, 0.06)), st.Settings(length=1.0))
+    lowest = 0.6 * advice._usual
+    assert advice.suggest() == max(length for length in advice._found if length <= lowest)
 
 
 def test_info_says_which_lengths_pass_and_why_others_do_not(
@@ -606,7 +627,9 @@ def test_no_length_nearby_is_longer_than_one_whose_limbs_are_too_thin(monkeypatc
     assert tried and max(tried) < 1.0
 
 
-def test_no_other_length_nearby_is_tried_after_four_without_hope(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_beyond_two_lengths_nearby_without_hope_on_each_side_the_usual_one_alone_is_tried(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     found = SimpleNamespace(
         faults=[SimpleNamespace(kind="manifold")],
         missing=0.0,
@@ -626,7 +649,9 @@ def test_no_other_length_nearby_is_tried_after_four_without_hope(monkeypatch: py
     monkeypatch.setattr("scantruss.pipeline.make_grid_with_wide_ridges", refuse)
     cloud = st.PointCloud.from_array(sheet(12, 12, 0.1))
     assert Advice(cloud, st.Settings(length=1.0)).nearby(0.5) is None
-    assert len(set(tried)) == HOPELESS_NEARBY
+    shorter = [length for length in set(tried) if length < 0.5]
+    longer = [length for length in set(tried) if length > 0.5]
+    assert sorted((len(shorter), len(longer))) == [HOPELESS_NEARBY, HOPELESS_NEARBY + 1]
 
 
 def test_a_length_at_which_no_quick_run_passes_is_begun_as_grid_begins() -> None:

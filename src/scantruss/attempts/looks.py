@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..check.distances import measure_distances
-from ..check.sheets import broken_limb
+from ..check.sheets import broken_limb, webbed_limb
 from ..constraints.ridges import find_ridges
 from ..front.orientation_field import usual_starts
 from ..surface.chosen_samples import KEPT, LIMB, ROD
@@ -192,7 +192,7 @@ def follows_more(grid: Grid, other: Grid) -> bool:
 
 
 def breaks_limb(grid: Grid, cloud: PointCloud, asked: Settings, settings: Settings) -> Place | None:
-    """Return a place where a grid of other settings than were asked for misses a part of a limb; None where there is none.
+    """Return a place where a grid of other settings than were asked for misses a part of a limb, not all; None where there is none.
 
     What is asked for cuts that limb off at a clean ring, or at two.
     """
@@ -203,7 +203,11 @@ def breaks_limb(grid: Grid, cloud: PointCloud, asked: Settings, settings: Settin
     limb = (cut.judged == LIMB) & (samples.judged == KEPT)
     if not limb.any():
         return None
-    return broken_limb(samples, limb, measure_distances(grid, samples, settings.length).scan, settings.length)
+    away = measure_distances(grid, samples, settings.length).scan
+    shortest = settings.min_length * settings.length
+    return broken_limb(samples, limb, away, settings.length) or webbed_limb(
+        samples, cut, away, settings.length, shortest
+    )
 
 
 def stands_on_columns(cloud: PointCloud, settings: Settings) -> bool:

@@ -98,14 +98,14 @@ class Judged:
         missed_at = place_of(samples.scan[farthest_followed(found.scan, followed, members)] + samples.origin)
         rough = samples.moved
         feet = feet_on(grid, samples, found, length)
-        offsets, (gaps, bridged), doubtful, aside, beyond, beside, apart, bare, peaks = side_by_side(
+        offsets, (gaps, bridged), doubtful, aside, beyond, beside, (apart, struts), bare, peaks = side_by_side(
             lambda: _offsets(grid, samples, length),
             lambda: bridged_gaps(grid, samples, boundary, length),
             lambda: [] if settings.boundary else doubtful_places(grid, samples, length, boundary.corners),
             lambda: _at_boundary(grid, samples, boundary, found, followed, members, length),
             lambda: boundary_faults(grid, samples, boundary, length),
             lambda: [] if rough else _beside(grid, samples, found, followed, members),
-            lambda: cut_apart(grid, samples, found, length) + false_struts(grid, samples, self.certificate, length),
+            lambda: (cut_apart(grid, samples, found, length), false_struts(grid, samples, self.certificate, length)),
             lambda: mostly_bare(grid, samples, feet, length),
             lambda: [] if rough else rounded_peaks(grid, samples, found, followed, members),
         )
@@ -131,6 +131,7 @@ class Judged:
                 *too_sparse,
                 *too_frayed,
                 *beyond,
+                *struts,
                 *bare,
                 *(each for each in bridged if each.kind == "bridged"),
                 *too_far,

@@ -32,7 +32,7 @@ def faults_of_topology(grid: Grid, found: Certificate, boundary: Boundary) -> li
     faults = []
     if not found.manifold:
         faults.append(Fault("manifold", "is not manifold", _seam(grid)))
-    if not found.orientable:
+    elif not found.orientable:  # what is not manifold is one-sided at its seam
         faults.append(Fault("orientable", "is not orientable"))
     if found.pieces != found.scan_pieces:
         words = f"is in {found.pieces} pieces where the scan has {found.scan_pieces}".replace(" 1 pieces", " 1 piece")

@@ -24,7 +24,7 @@ STRUTS_APART = 2.0  # rings whose middles are nearer to each other are around on
 
 
 def false_struts(grid: Grid, samples: SurfaceSamples, found: Certificate, length: float) -> list[Fault]:
-    """Return a warning of the handles of a grid that join two sheets of its scan which the scan does not join there.
+    """Return a fault where handles of a grid join two sheets of its scan which the scan does not join there.
 
     Around a limb or a handle of the scan its normals point away from the limb. Around a strut between two sheets that only lie near
     each other, as two legs do, they point along it, those of each sheet towards the other.

@@ -13,6 +13,7 @@ from ..surface.chosen_samples import KEPT, LIMB
 from ..surface.near_scan import distance_from_scan
 from ..surface.scratch import with_own_scratch
 from .left_out import LIMBS_APART, points_together
+from .limits import COVER_REACH
 
 if TYPE_CHECKING:
     from ..errors import Place
@@ -32,7 +33,9 @@ MIDDLE_OFF, SPACINGS_OFF, FACES_ALIKE = 0.25, 2.0, 0.5
 # gap between points of one side of a break, and distance from it of those beside it [member lengths]
 BESIDE_BREAK = 0.25
 SPACINGS_BESIDE_BREAK = 1.5  # ... and in spacings of the points
-FEWEST_BESIDE_BREAK = 6  # fewest points of a side of a break
+FEWEST_BESIDE_BREAK = 6  # fewest points of a side of a break, and of a stub
+# how far off the body a stub of a handle reaches at least, and how near its points are to the grid [member lengths]
+LENGTH_OF_STUB, FOLLOWED_BY_STUB = 0.75, 0.25
 
 
 def nodes_of_samples(grid: Grid, samples: SurfaceSamples, length: float) -> np.ndarray:
@@ -104,6 +107,38 @@ def broken_limb(samples: SurfaceSamples, limb: np.ndarray, distance: np.ndarray,
         if (sides >= FEWEST_BESIDE_BREAK).sum() > 1:
             middle = part[((part - part.mean(axis=0)) ** 2).sum(axis=1).argmin()]
             return place_of(middle + samples.origin)
+    return None
+
+
+def webbed_limb(
+    samples: SurfaceSamples, cut: SurfaceSamples, distance: np.ndarray, length: float, shortest: float
+) -> Place | None:
+    """Return a place where a grid follows a limb that no tube of members goes around, or only a stub of a handle; None where there is none.
+
+    Parameters
+    ----------
+    samples : of the grid
+    cut : of the same scan, with all limbs cut off that are too thin for the members: a handle at two rings or more
+    distance : (N,) of each point from the grid [scan unit]
+    shortest : length of the shortest member, of which three go around a tube at least [scan unit]
+    """
+    from scipy.spatial import cKDTree
+
+    limb = np.flatnonzero(cut.judged == LIMB)
+    group = points_together(cut.scan[limb], np.full(len(limb), LIMBS_APART * length))
+    _, nearest = cKDTree(cut.scan[limb]).query(np.array([ring.points[0] for ring in cut.rings]))
+    off_body, _ = cKDTree(cut.scan[cut.judged == KEPT]).query(cut.scan[limb])
+    followed = (samples.judged[limb] == KEPT) & (distance[limb] < FOLLOWED_BY_STUB * length)
+    stub = followed & (off_body > LENGTH_OF_STUB * length)
+    for each in np.unique(group[nearest]):
+        rings = [ring for ring, at in zip(cut.rings, group[nearest], strict=True) if at == each]
+        own = group == each
+        is_thin = min(ring.girth for ring in rings) < 3.0 * shortest
+        missed = own & (distance[limb] > COVER_REACH * length)
+        wrong = limb[stub & own] if is_thin else limb[missed] if len(rings) > 1 else limb[:0]
+        if min(len(wrong), (stub & own).sum()) >= FEWEST_BESIDE_BREAK:
+            places = samples.scan[wrong]
+            return place_of(places[((places - places.mean(axis=0)) ** 2).sum(axis=1).argmin()] + samples.origin)
     return None
 
 

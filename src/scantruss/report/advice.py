@@ -297,7 +297,7 @@ class Advice:
         }
         if (sure := round_length(ladder.SURE_PER_SPACING * self._cloud.spacing, "up")) > length and sure < high:
             lengths.add(sure)
-        self._count_at(at, ladder.MOST_TRIED)
+        self._count_at(at, ladder.MOST_TRIED - ladder.TRIED_USUAL)
         for most in (ladder.FIRST_TWO, ladder.A_FEW, ladder.SOME_MORE):
             hopeless = {True: 0, False: 0}  # shorter and longer lengths in a row
             for each in sorted(lengths, key=lambda other: (abs(np.log(other / length)), other)):

@@ -52,8 +52,8 @@ FAR_TOO_SHORT = 0.2  # share of the shortest possible length below which the usu
 POINTS_PER_MEMBER = 9  # points that cost as much as a member of the grid
 MOST_MEMBERS = 60_000  # members of a grid that is made to try a length
 CLOSE_BEND = 0.95  # share of the scan that is less bent than the radius that is named
-# lengths one after the other, all of whose grids are far from passing or fail by their fronts, beyond which no other nearby is tried
-HOPELESS_NEARBY = 3
+# lengths one after the other, all of whose grids are far from passing or fail by their fronts, beyond which none on that side is tried
+HOPELESS_NEARBY = 2
 # lengths that were tried from which on only longer ones are looked at where there is no hope for any
 HOPELESS_LENGTHS = 3
 # lengths that are tried beside the usual one where none of these passes, as multiples of it

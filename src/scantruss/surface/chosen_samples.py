@@ -57,7 +57,6 @@ class Asked(NamedTuple):
     sharp_edges: bool  #: whether samples on sharp edges of bodies face away from them
     plain_body: bool  #: whether thin limbs are taken off the body that the scan encloses, and slits filled
     thin_walls: bool  #: whether the sides of thin walls are distinguished first
-    allow_missing: float  #: share of the points that limbs cut off where they leave the body may be
 
     @classmethod
     def of(cls, settings: Settings, origin: np.ndarray, z_is_up: bool = False) -> Asked:
@@ -84,7 +83,6 @@ class Asked(NamedTuple):
             settings.sharp_edges,
             settings.plain_body,
             settings.thin_walls,
-            settings.allow_missing,
         )
 
 

@@ -16,7 +16,6 @@ from ..kernels.surface.local_surface import Surface, flood
 from ..kernels.surface.rods import spreads_around
 from ..runtime.parallel import run_in_parts
 from .given_normals import GivenNormals
-from .owners import far_from_rest
 from .pieces import LEAST_TRIANGLES, TRIANGLE_AREA, sample_areas
 from .rods import line_like
 from .tubes import (
@@ -67,7 +66,6 @@ def cut_limbs(
     points: np.ndarray,
     spacing: float,
     girth: float,
-    allow_missing: float,
     surface: Surface,
     boxes: SearchBoxes,
     given: GivenNormals | None = None,
@@ -79,8 +77,6 @@ def cut_limbs(
     ----------
     girth : float
         Below which limbs are cut off [desired lengths].
-    allow_missing : float
-        Share of the points that may be missing: limbs are cut off where they leave the body, unless that is more.
     surface, boxes : Surface, SearchBoxes
         The samples of the points.
     given : GivenNormals, optional
@@ -100,8 +96,6 @@ def cut_limbs(
     if parts is None:
         return none
     gone, rings = parts.cut()
-    if far_from_rest(points, which[gone], owner, surface) > allow_missing * len(points):
-        gone, rings = parts.cut(at_body=False)
     if not gone.any() or gone.sum() > MOST_OF_SCAN_THIN * len(points):
         return none
     none[0][which[gone]] = True
@@ -205,8 +199,8 @@ class _Parts:
         solid = ~thin & (at_boundary | (total >= LEAST_TRIANGLES * TRIANGLE_AREA))[label]
         return cls(points, owner, surface, axis, girth, limit, label, thin, reached, solid, body)
 
-    def cut(self, at_body: bool = True) -> tuple[np.ndarray, tuple[LimbRing, ...]]:
-        """Return which points (N,) bool are cut off, and the rings: where limbs leave the body, or where they are seen to be thin."""
+    def cut(self) -> tuple[np.ndarray, tuple[LimbRing, ...]]:
+        """Return which points (N,) bool are cut off, and the rings where limbs leave the body."""
         label = self.label
         one, other = self._links(self.thin, ~self.thin)
         kept_necks = self._kept_necks(label[one], label[other])
@@ -221,7 +215,7 @@ class _Parts:
             if self._thinnest(gone & self.thin) > (BLUNT_GIRTH if blunt else SURE_GIRTH) * self.limit:
                 continue
             off = gone[self.owner]
-            found = [self._rings_at(end, gone, off, at_body) for end in self._ends(gone)]
+            found = [self._rings_at(end, gone, off) for end in self._ends(gone)]
             if found and all(found):  # what has no clean end stays
                 rings += chain.from_iterable(found)
                 removed |= off
@@ -238,9 +232,9 @@ class _Parts:
                 ends.append(end)
         return ends
 
-    def _rings_at(self, end: np.ndarray, gone: np.ndarray, removed: np.ndarray, at_body: bool) -> list[LimbRing]:
+    def _rings_at(self, end: np.ndarray, gone: np.ndarray, removed: np.ndarray) -> list[LimbRing]:
         """Return the rings at an end (S,) bool of what is cut off, as near to the body as all are clean, and mark what lies beyond."""
-        for step in range(int(self.reached[end].max()) if at_body else 0, -1, -1):
+        for step in range(int(self.reached[end].max()), -1, -1):
             stays = end & (self.reached > step)
             left = gone & ~stays
             one, other = self._links(left & self.thin, ~left & (end | ~self.thin))

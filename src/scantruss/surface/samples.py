@@ -344,9 +344,7 @@ def _prepare(
     if asked.limb_girth and thinned:
         kept = np.flatnonzero(judged == KEPT)
         left = np.concatenate([scan[kept], added]) if len(added) else scan[kept]
-        limb, rings = cut_limbs(
-            left, spacing, asked.limb_girth, asked.allow_missing, surface, chosen.found.boxes, given, chosen.smooth
-        )
+        limb, rings = cut_limbs(left, spacing, asked.limb_girth, surface, chosen.found.boxes, given, chosen.smooth)
         if rings:
             judged[kept[limb[: len(kept)]]], added = LIMB, added[~limb[len(kept) :]]
             left = np.ascontiguousarray(left[~limb])
