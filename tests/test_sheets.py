@@ -15,6 +15,7 @@ import scantruss as st
 from scantruss.check import sheets
 from scantruss.check.certify import certify
 from scantruss.check.sheets import faults_on_sheets, nodes_of_samples
+from scantruss.grid.certificate import Fault
 from scantruss.kernels.boundary import room as kernels
 from scantruss.kernels.mesh import sheets as mesh_kernels
 from scantruss.kernels.surface import normals as facing
@@ -131,6 +132,24 @@ def test_a_grid_that_is_cut_where_the_scan_is_whole_is_refused(monkeypatch: pyte
     assert faults_on_sheets(disconnected, open_scan, nearest, 1.0) == [fault]  # a gap that a grid bridges
     monkeypatch.setattr(sheets, "FACES_ALIKE", 1.1)  # its sides face different ways, as an arm and the knee beside it
     assert faults_on_sheets(disconnected, open_scan, nearest, 1.0) == []
+
+
+def test_a_grid_that_ends_on_both_sides_of_a_part_of_its_scan_is_torn() -> None:
+    """As at a handle of three members whose middle was missed by two: the certificate passed with what it misses said as so many points."""
+    settings = st.Settings(length=1.0, effort="quick", allow_missing=1.0)
+    cloud = st.PointCloud.from_array(sheet(4, 14, 0.12, seed=2))
+    grid, (samples, boundary, _) = grid_from_cloud(cloud, settings), steps_of(cloud, settings)
+    y = grid.nodes[grid.triangles][:, :, 1].mean(axis=1)
+
+    def torn(left: np.ndarray) -> list[Fault]:
+        nodes, triangles = np.unique(grid.triangles[left], return_inverse=True)
+        kept = {name: getattr(grid, name)[nodes] for name in ("nodes", "fixed", "deviation")}
+        part = grid.replace(triangles=triangles.reshape(-1, 3), alike=None, line_sets=(), **kept)
+        return [fault for fault in certify(part, samples, boundary, settings).faults if fault.kind == "torn"]
+
+    assert torn(np.ones(len(y), bool)) == [] == torn(y < 4.0)
+    (fault,) = torn(abs(y - y.mean()) > 2.5)
+    assert abs(known(fault.where)[1] - y.mean()) < 1.5
 
 
 def test_certificates_of_one_scan_can_be_made_side_by_side() -> None:

@@ -30,7 +30,7 @@ from .limits import COVER_REACH, limits_of, mostly_rounded, places_to_look_at, w
 from .missed import farthest_followed, largest_patch_missed, points_missed, shares_rounded
 from .openings import boundary_faults
 from .refusal import passed_grid
-from .sheets import cut_apart, faults_on_sheets, nodes_of_samples
+from .sheets import cut_apart, faults_on_sheets, nodes_of_samples, torn_apart
 from .slits import feet_on, narrow_gaps
 from .sparse import sparse_parts
 from .steps import unfollowed_steps
@@ -180,6 +180,7 @@ def judge(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings: Set
     further = (
         *too_far,
         *faults_on_sheets(grid, samples, nearest, length),
+        *torn_apart(grid, samples, found.scan * length / members, length),
         *hanging_nodes(grid, samples, found, length),
         *nodes_off_sheets(grid, samples, length),
         *spikes(grid, samples, found, length),

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 # distance from the nearest node on its sheet at which a part of the scan is left out [member lengths]
 FARTHEST_COVERED = 1.2
 LEFT_OUT = 0.2  # share of the sheets that a grid may leave out
+TORN = "is torn where the scan is whole, as at a handle thinner than its members"
 MEMBERS_APART_TORN = 4  # members between two nodes from which on neighbouring parts of the scan are torn apart
 FEWEST_LINKS = 3  # fewest links between such parts that are no accident
 MOST_LINKS = 1000  # most that are looked at
@@ -46,6 +47,12 @@ def nodes_of_samples(grid: Grid, samples: SurfaceSamples, length: float) -> np.n
     return nearest
 
 
+def torn_apart(grid: Grid, samples: SurfaceSamples, distance: np.ndarray, length: float) -> list[Fault]:
+    """Return a fault where a grid ends on both sides of a part of its scan, as at a handle; distance as of `broken_limb`."""
+    broken = broken_limb(samples, (samples.judged == KEPT) & ~samples.elsewhere, distance, length)
+    return [] if broken is None else [Fault("torn", TORN, broken)]
+
+
 def faults_on_sheets(grid: Grid, samples: SurfaceSamples, nearest: np.ndarray, length: float) -> list[Fault]:
     """Return what is wrong with how a grid covers each sheet of the scan; nearest (S,) and length as `nodes_of_samples`."""
     wanted = ~np.isin(samples.piece, samples.not_chosen)
@@ -57,8 +64,7 @@ def faults_on_sheets(grid: Grid, samples: SurfaceSamples, nearest: np.ndarray, l
         faults.append(Fault("cover", f"leaves out {share:.0%} of the sheets of the scan", where))
     disconnected = disconnected_place(grid, samples, nearest, length)
     if disconnected is not None:
-        words = "is torn where the scan is whole, as at a handle thinner than its members"
-        faults.append(Fault("torn", words, place_of(disconnected + grid.origin)))
+        faults.append(Fault("torn", TORN, place_of(disconnected + grid.origin)))
     return faults
 
 
