@@ -20,7 +20,7 @@ from scantruss.boundary.find import find_boundary
 from scantruss.check.certify import Judged, judge
 from scantruss.constraints.find import find_constraints, wanted_ridges
 from scantruss.constraints.fold_tracing import Tracer
-from scantruss.constraints.lines_of_folds import GAIN_OF_SURE, is_clear_on_rough, is_even, parts_of_fold
+from scantruss.constraints.lines_of_folds import GAIN_OF_SURE, is_clear_on_rough, is_even, is_made, parts_of_fold
 from scantruss.constraints.ridge_ends import Ridge, join_ends
 from scantruss.constraints.ridges import find_ridges
 from scantruss.errors import FrontError
@@ -226,6 +226,19 @@ def test_among_places_that_only_look_folded_a_long_sure_line_is_a_ridge(
     folds = np.zeros(int(4 * members), FOLD)
     folds["bend"], folds["gain"] = np.radians(bend), gain * GAIN_OF_SURE
     assert is_clear_on_rough(folds, np.radians(40.0)) is is_clear
+
+
+@pytest.mark.parametrize(
+    ("bend", "gain", "count", "made"),
+    [(45, 1300, 20, True), (45, 1000, 20, False), (110, 600, 20, True), (110, 600, 12, False), (130, 600, 20, False)],
+)
+def test_a_wide_fold_is_an_edge_where_it_is_even_or_steep_along_four_members(
+    bend: float, gain: float, count: int, made: bool
+) -> None:
+    """As the lip of a cave, which is neither as even as one that was made nor turned back as a wave or an ear is."""
+    folds = np.zeros(count, FOLD)
+    folds["bend"], folds["gain"] = np.radians(bend), gain
+    assert is_made(folds) == made
 
 
 def test_lines_of_folds_are_parted_at_their_corners() -> None:

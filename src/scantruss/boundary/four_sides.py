@@ -10,7 +10,8 @@ import numpy as np
 from ..kernels.surface.local_surface import Surface
 from .corners import CURVE_STEP
 
-LONGEST = 24.0  # loops up to this length are looked at [member lengths]
+# loops of these lengths are looked at: on shorter ones too few points tell four sides from a circle [member lengths]
+SHORTEST_LOOP, LONGEST_LOOP = 5.0, 24.0
 EVERY = 2  # only each second point of the curve is looked at
 NEAR_CORNER = 0.2  # points nearer to a corner than this are rounded off [member lengths]
 SHORTEST = 0.6  # shortest side [member lengths]
@@ -36,7 +37,7 @@ def corners_of_four_sides(curve: np.ndarray, surface: Surface, density: float) -
     length = surface.length
     none = np.zeros((0, 3))
     places = curve[::EVERY]
-    if len(places) * EVERY * CURVE_STEP > LONGEST or len(places) < 4 * _steps(SHORTEST):
+    if not SHORTEST_LOOP <= len(places) * EVERY * CURVE_STEP <= LONGEST_LOOP:
         return none
     middle = places.mean(axis=0)
     axes = np.linalg.svd(places - middle, full_matrices=False)[2]

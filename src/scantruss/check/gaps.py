@@ -158,7 +158,7 @@ def openings_closed(
     )
     words = f"closes a place {what}, where {why}{more}" if why else ""
     small = (wide[0].size or 0.0) < SMALLEST_HOLE / math.pi * length
-    words = words or f"closes an opening {what}{more}{'; shorter members leave it open' if small else ''}"
+    words = words or f"closes an opening {what}{more}; shorter members {'leave' if small else 'may leave'} it open"
     return [Fault("closed", words, places[0] if places else None, tuple(places[1:PLACES_KEPT]))]
 
 

@@ -10,6 +10,8 @@ LEAST_FULL_SHARE = 0.55  # least share of a ridge that has the full angle, unles
 LONG_FULL = 2.5  # length of a ridge with the full angle that is enough, whatever its share [member lengths]
 GAIN_OF_SURE = 90.0  # median gain of a line of folds that is sure, at least
 GAIN_OF_MADE, LEAST_MADE = 1200.0, 4.0  # the same of one that was made, and its length [member lengths]
+# bend from which on a fold is an edge, as waves are less steep, and median gain of such a line that was made or broke off
+BEND_OF_EDGE, GAIN_OF_EDGE = np.radians(85.0), 500.0
 LEAST_ROUGH_RIDGE = 6.0  # least length of a line of folds on a rough scan [member lengths]
 # share of the ridge angle by which half of such a line is folded at least, where it is not sure and longer
 ROUGH_SHARE = 1.4
@@ -51,8 +53,13 @@ def is_lip(folds: np.ndarray) -> bool:
 
 
 def is_made(folds: np.ndarray) -> bool:
-    """Whether a line of wide folds (K,) FOLD is so long, between sides so even, that it was made: waves and what has grown are not."""
-    return len(folds) * FOLD_STRIDE >= LEAST_MADE and bool(np.median(folds["gain"]) >= GAIN_OF_MADE)
+    """Whether a line of wide folds (K,) FOLD is so long, and so steep or between sides so even, that it was made or broke off.
+
+    Waves and what has grown are not.
+    """
+    is_edge = BEND_OF_EDGE <= np.median(folds["bend"]) < TURNS_BACK
+    least = GAIN_OF_EDGE if is_edge else GAIN_OF_MADE
+    return len(folds) * FOLD_STRIDE >= LEAST_MADE and bool(np.median(folds["gain"]) >= least)
 
 
 def is_sure(folds: np.ndarray, angle: float) -> bool:
