@@ -35,6 +35,8 @@ MIDDLE_OFF, SPACINGS_OFF, FACES_ALIKE = 0.25, 2.0, 0.5
 BESIDE_BREAK = 0.25
 SPACINGS_BESIDE_BREAK = 1.5  # ... and in spacings of the points
 FEWEST_BESIDE_BREAK = 6  # fewest points of a side of a break, and of a stub
+# least share of the points beside a part of a scan that each side of it has where a grid ends on both: at a bush nearly all are on one
+SHARE_OF_SIDE = 0.2
 # how far off the body a stub of a handle reaches at least, and how near its points are to the grid [member lengths]
 LENGTH_OF_STUB, FOLLOWED_BY_STUB = 0.75, 0.25
 
@@ -49,7 +51,8 @@ def nodes_of_samples(grid: Grid, samples: SurfaceSamples, length: float) -> np.n
 
 def torn_apart(grid: Grid, samples: SurfaceSamples, distance: np.ndarray, length: float) -> list[Fault]:
     """Return a fault where a grid ends on both sides of a part of its scan, as at a handle; distance as of `broken_limb`."""
-    broken = broken_limb(samples, (samples.judged == KEPT) & ~samples.elsewhere, distance, length)
+    followed = (samples.judged == KEPT) & ~samples.elsewhere
+    broken = broken_limb(samples, followed, distance, length, SHARE_OF_SIDE)
     return [] if broken is None else [Fault("torn", TORN, broken)]
 
 
@@ -87,13 +90,16 @@ def cut_apart(grid: Grid, samples: SurfaceSamples, found: Distances, length: flo
     return [Fault("apart", words, place_of(grid.nodes[node_piece == smallest].mean(axis=0) + grid.origin))]
 
 
-def broken_limb(samples: SurfaceSamples, limb: np.ndarray, distance: np.ndarray, length: float) -> Place | None:
+def broken_limb(
+    samples: SurfaceSamples, limb: np.ndarray, distance: np.ndarray, length: float, share: float = 0.0
+) -> Place | None:
     """Return a place where a grid follows a limb on both sides of a part that it misses by more than a member; None where there is none.
 
     Parameters
     ----------
     limb : (N,) bool, the points of limbs that the grid is to follow
     distance : (N,) of each point from the grid [scan unit]
+    share : least share of the points beside the part that each side has
     """
     from scipy.spatial import cKDTree
 
@@ -110,7 +116,7 @@ def broken_limb(samples: SurfaceSamples, limb: np.ndarray, distance: np.ndarray,
         if not len(beside):
             continue
         sides = np.bincount(points_together(beside, np.full(len(beside), apart)))
-        if (sides >= FEWEST_BESIDE_BREAK).sum() > 1:
+        if (sides >= max(FEWEST_BESIDE_BREAK, share * len(beside))).sum() > 1:
             middle = part[((part - part.mean(axis=0)) ** 2).sum(axis=1).argmin()]
             return place_of(middle + samples.origin)
     return None
