@@ -177,10 +177,12 @@ def judge(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings: Set
     ]
     too_far, poor = limits_of(grid, found, settings)
     known = {fault.kind for fault in faults}
+    on_sheets = faults_on_sheets(grid, samples, nearest, length)
+    if not any(fault.kind == "torn" for fault in on_sheets):
+        on_sheets += torn_apart(samples, found.scan * length / members, length)
     further = (
         *too_far,
-        *faults_on_sheets(grid, samples, nearest, length),
-        *torn_apart(grid, samples, found.scan * length / members, length),
+        *on_sheets,
         *hanging_nodes(grid, samples, found, length),
         *nodes_off_sheets(grid, samples, length),
         *spikes(grid, samples, found, length),

@@ -49,7 +49,7 @@ def nodes_of_samples(grid: Grid, samples: SurfaceSamples, length: float) -> np.n
     return nearest
 
 
-def torn_apart(grid: Grid, samples: SurfaceSamples, distance: np.ndarray, length: float) -> list[Fault]:
+def torn_apart(samples: SurfaceSamples, distance: np.ndarray, length: float) -> list[Fault]:
     """Return a fault where a grid ends on both sides of a part of its scan, as at a handle; distance as of `broken_limb`."""
     followed = (samples.judged == KEPT) & ~samples.elsewhere
     broken = broken_limb(samples, followed, distance, length, SHARE_OF_SIDE)
