@@ -83,7 +83,7 @@ def rod_points(found: Linked, points: int, length: float, supports: np.ndarray |
         rod |= ends
     rod &= _long_groups(found, rod, known, length) & ~_of_sparse_sheets(found, rod, along_line, length)
     rod &= ~_arms(found, rod, length)
-    rod &= ~_feet(found, rod)
+    rod &= ~_feet(found, rod) | known
     rod |= _behind_sheets(found, rod, length)
     if rod.mean() > MOST_RODS:
         rod[:] = False
