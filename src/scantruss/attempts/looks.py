@@ -15,7 +15,7 @@ from ..surface.chosen_samples import KEPT, LIMB, ROD
 from ..surface.samples import sample_surface
 from ..surface.shape import wall_of_surface
 from ..surface.sharp_edges import EDGE_SHARE, FEWEST_NEEDED
-from ..surface.supports import are_columns, free_columns, lies_under_itself
+from ..surface.supports import are_columns, column_stays, free_columns, lies_under_itself
 
 if TYPE_CHECKING:
     from ..errors import Place
@@ -219,6 +219,15 @@ def stands_on_columns(cloud: PointCloud, settings: Settings) -> bool:
     rods = without.scan[without.judged == ROD]
     shell = without.surface.mean[without.piece != (-1 if without.floor is None else without.floor)]
     return bool(len(rods)) and are_columns(rods, shell, settings.length)
+
+
+def keeps_columns(cloud: PointCloud, settings: Settings) -> bool:
+    """Whether the settings keep any column that a shell stands on, or its floor for them: not where all are cut off as limbs."""
+    cut, without = sample_surface(cloud, settings), sample_surface(cloud, settings.replace(keep_rods=False))
+    rod = without.judged == ROD
+    return (cut.floor is None and without.floor is not None) or column_stays(
+        without.scan[rod], cut.judged[rod] == KEPT, settings.length
+    )
 
 
 def _has_more_outliers(cloud: PointCloud, settings: Settings) -> bool:

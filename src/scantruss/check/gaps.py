@@ -167,7 +167,7 @@ def _closed(holes: list[LeftOut], begin: str, why: str, unit: str, then: str = "
 
 
 def _has_points_within(points: np.ndarray, hole: LeftOut, origin: np.ndarray, length: float) -> bool:
-    """Whether any of the points (N, 3) from an origin (3,) lies in a hole, or within half a member of it."""
+    """Whether any of the points (N, 3) from an origin (3,) lies in a hole, or within three quarters of a member of it."""
     away = ((points + origin - np.array(hole.where)) ** 2).sum(axis=1)
     return bool((away <= ((hole.size or 0.0) + BESIDE_HOLE * length) ** 2).any())
 

@@ -168,13 +168,23 @@ def are_columns(rods: np.ndarray, shell: np.ndarray, length: float) -> bool:
     """
     if _under_shell(shell, length).mean() > MOST_UNDER:
         return False
-    group, upright = _beside_each_other(rods[:, :2], CELL_WIDTH * length), 0
+    return 2 * sum(map(len, _uprights(rods, length))) > len(rods)
+
+
+def column_stays(rods: np.ndarray, kept: np.ndarray, length: float) -> bool:
+    """Whether most points of any upright, slender part of rods (N, 3) are kept, (N,) bool."""
+    return any(2 * kept[own].sum() > len(own) for own in _uprights(rods, length))
+
+
+def _uprights(rods: np.ndarray, length: float) -> list[np.ndarray]:
+    """Return the numbers of the points (N, 3) of each upright, slender part of rods; a capital and a base are no wider part of it."""
+    group, uprights = _beside_each_other(rods[:, :2], CELL_WIDTH * length), []
     for each in np.unique(group):
-        own = rods[group == each]
-        width = np.ptp(np.quantile(own[:, :2], SHAFT, axis=0), axis=0).max()
-        height = np.ptp(own[:, 2])
-        upright += len(own) * bool(width <= WIDEST_SUPPORT * length and height >= LEAST_SLENDER * width)
-    return 2 * upright > len(rods)
+        own = np.flatnonzero(group == each)
+        width = np.ptp(np.quantile(rods[own, :2], SHAFT, axis=0), axis=0).max()
+        if width <= WIDEST_SUPPORT * length and np.ptp(rods[own, 2]) >= max(LEAST_SLENDER * width, length):
+            uprights.append(own)
+    return uprights
 
 
 def lies_under_itself(mean: np.ndarray, length: float) -> bool:
