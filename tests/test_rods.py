@@ -520,3 +520,16 @@ def test_columns_of_one_diameter_are_all_left_out(length: float) -> None:
     assert stands_on_columns(cloud, st.Settings(length=length))
     assert (samples.judged[column] == ROD).mean() > 0.97
     assert (samples.judged[points[:, 2] > 4.8] == ROD).mean() < 0.01
+
+
+def test_a_flat_strip_in_the_plane_of_a_sheet_is_no_rod_and_one_across_it_is() -> None:
+    """A table beyond the shadow of what stands on it, and one side of a column that stands on it."""
+    rng = np.random.default_rng(14)
+    table = np.column_stack([rng.uniform(-6, 6, (40_000, 2)), np.zeros(40_000)])
+    table = table[(np.abs(table[:, 0]) > 1.2) | (np.abs(table[:, 1]) > 3.0)]
+    strip = np.column_stack([rng.uniform(-0.25, 0.25, 800), rng.uniform(-2, 2, 800), np.zeros(800)])
+    post = strip[:, [0, 2, 1]] + [3.5, 3.5, 2.0]
+    points = np.concatenate([table, strip, post])
+    rods = rods_of(points + rng.normal(0.0, 0.004, points.shape), 1.0)
+    assert not rods[: len(table) + len(strip)].any(where=np.abs(points[: -len(post), 0]) < 1.0)
+    assert rods[-len(post) :][post[:, 2] > 0.3].mean() > 0.95

@@ -83,6 +83,7 @@ def rod_points(found: Linked, points: int, length: float, supports: np.ndarray |
         rod |= ends
     rod &= _long_groups(found, rod, known, length) & ~_of_sparse_sheets(found, rod, along_line, length)
     rod &= ~_arms(found, rod, length)
+    rod &= ~_patches(found, rod, length) | known
     rod &= ~_feet(found, rod) | known
     rod |= _behind_sheets(found, rod, length)
     if rod.mean() > MOST_RODS:
@@ -140,7 +141,7 @@ def _arms(found: Linked, rod: np.ndarray, length: float) -> np.ndarray:
         return arm
     label, beside = _groups_of(found, rod), found.neighbors
     begins = np.flatnonzero(rod & ((beside >= 0) & ~rod[beside]).any(axis=1))
-    normals = np.linalg.eigh(_moments(found, ~rod, COARSE_REACH * length)[0])[1][:, :, 0]
+    normals = _sheet_normals(found, rod, length)
     for group in np.unique(label[begins]):
         own = np.flatnonzero(rod & (label == group))
         points = np.concatenate([found.grouped[found.start[one] : found.start[one + 1]] for one in own])
@@ -149,6 +150,36 @@ def _arms(found: Linked, rod: np.ndarray, length: float) -> np.ndarray:
         level = [_is_level(points, found.mean[one], COARSE_REACH * length, normals[one]) for one in at]
         arm[own] = 2 * sum(level) > len(level)
     return arm
+
+
+def _patches(found: Linked, rod: np.ndarray, length: float) -> np.ndarray:
+    """Return which samples (S,) bool are of patches of a sheet that nothing joins to it, as beyond a shadow: flat, in its plane."""
+    patch = np.zeros(len(rod), np.bool_)
+    if not rod.any():
+        return patch
+    label = _groups_of(found, rod)
+    normals = _sheet_normals(found, rod, length)
+    for group in np.unique(label[rod]):
+        own = rod & (label == group)
+        points = _points_of(found, own)
+        if len(points) < SAMPLES_OF_SHEET:
+            continue
+        middle = points.mean(axis=0)
+        variances, axes = np.linalg.eigh(np.cov(points - middle, rowvar=False))
+        if variances[0] > FLAT_ACROSS * variances[1]:
+            continue
+        low, high = points.min(axis=0) - END_REACH * length, points.max(axis=0) + END_REACH * length
+        in_plane = ~rod & (np.abs((found.mean - middle) @ axes[:, 0]) < END_OFFSET * length)
+        in_plane &= ((found.mean > low) & (found.mean < high)).all(axis=1)
+        level = np.abs(normals[in_plane] @ axes[:, 0]) > LEVEL_WITH_SHEET
+        patch |= own & (level.sum() >= max(SAMPLES_OF_SHEET, 0.5 * len(level)))
+    return patch
+
+
+def _sheet_normals(found: Linked, rod: np.ndarray, length: float) -> np.ndarray:
+    """Return the normals (S, 3) of the sheet around each sample, without rods."""
+    normals: np.ndarray = np.linalg.eigh(_moments(found, ~rod, COARSE_REACH * length)[0])[1][:, :, 0]
+    return normals
 
 
 def _feet(found: Linked, rod: np.ndarray) -> np.ndarray:
