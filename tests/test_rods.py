@@ -140,15 +140,18 @@ def test_the_edge_of_a_roof_does_not_run_down_its_columns() -> None:
 @pytest.mark.parametrize(("reason", "words"), [(ROD, "where a column"), (KEPT, "shorter members leave it open")])
 def test_a_place_that_was_closed_under_a_column_is_no_opening(reason: int, words: str) -> None:
     """Shorter members do not open it."""
-    samples = cast(SurfaceSamples, SimpleNamespace(scan=np.zeros((5, 3)), judged=np.full(5, reason), origin=np.ones(3)))
-    hole = LeftOut("hole", 1, 0.0, (1.5, 1.0, 1.0), 0.8)
+    below = np.linspace([0.0, 0.0, -2.0], [0.0, 0.0, -0.5], 5)
+    samples = cast(SurfaceSamples, SimpleNamespace(scan=below, judged=np.full(5, reason), origin=np.ones(3)))
+    hole = LeftOut("hole", 1, 0.0, (1.2, 1.0, 1.0), 0.8)
     (warning,) = openings_closed([hole], [], samples, LENGTH, "m")
     assert words in warning.words and "0.8 m" in warning.words and warning.where == hole.where
 
 
 def test_a_place_under_a_column_and_an_opening_are_said_apart() -> None:
-    samples = cast(SurfaceSamples, SimpleNamespace(scan=np.zeros((5, 3)), judged=np.full(5, ROD), origin=np.ones(3)))
-    holes = [LeftOut("hole", 1, 0.0, (x, 1.0, 1.0), 0.8) for x in (1.0 + 0.8 + 0.4 * LENGTH, 9.0)]
+    """An opening beside a column is not that of the column."""
+    below = np.linspace([0.0, 0.0, -4.0], [0.0, 0.0, -0.5], 50)
+    samples = cast(SurfaceSamples, SimpleNamespace(scan=below, judged=np.full(50, ROD), origin=np.ones(3)))
+    holes = [LeftOut("hole", 1, 0.0, (x, 1.0, 1.3), 0.8) for x in (1.1, 1.6)]
     column, opening = openings_closed(holes, [], samples, LENGTH, "")
     assert column.words == "closes a place 0.8 across, where a column or the like was left out"
     assert opening.words == "closes an opening 0.8 across; shorter members leave it open"

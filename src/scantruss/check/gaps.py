@@ -44,12 +44,10 @@ PLACES_ACROSS_GAP = np.stack(np.meshgrid(*[np.linspace(-0.6, 0.6, 7)] * 2), axis
 )  # places around another [reach]
 MOST_BRIDGED = 1.2  # width of a gap that is open there from which on a grid that bridges it fails [member lengths]
 OPEN_FROM = 0.1  # distance of the boundary from the nearest point from which on a gap there is open [member lengths]
-
 WIDE_OPENING = 0.5  # longest side from which on an opening that is closed is said [member lengths]
-BESIDE_HOLE = (
-    0.5  # distance from an opening within which what was left out is said to be why it is closed [member lengths]
-)
-
+# distance from an opening within which what was left out may be why it is closed [member lengths], and that of its middle from the axis
+# of what was left out [size of the opening]
+BESIDE_HOLE, OFF_AXIS = 0.75, 0.3
 GAPS_LOOKED_AT = 500  # places that are looked at closely, those farthest from all points first
 
 
@@ -149,7 +147,7 @@ def openings_closed(
     said_here: list[Fault] = []
     for judged, why in left_out:
         points = samples.scan[samples.judged == judged]
-        own = [hole for hole in wide if hole.where and _has_points_within(points, hole, samples.origin, length)]
+        own = [hole for hole in wide if hole.where and _is_in_line(points, hole, samples.origin, length)]
         wide = [hole for hole in wide if hole not in own]
         said_here += _closed(own, "closes a place", f", where {why}", unit)
     small = bool(wide) and (wide[0].size or 0.0) < SMALLEST_HOLE / math.pi * length
@@ -166,10 +164,16 @@ def _closed(holes: list[LeftOut], begin: str, why: str, unit: str, then: str = "
     return [Fault("closed", words, places[0] if places else None, tuple(places[1:PLACES_KEPT]))]
 
 
-def _has_points_within(points: np.ndarray, hole: LeftOut, origin: np.ndarray, length: float) -> bool:
-    """Whether any of the points (N, 3) from an origin (3,) lies in a hole, or within three quarters of a member of it."""
-    away = ((points + origin - np.array(hole.where)) ** 2).sum(axis=1)
-    return bool((away <= ((hole.size or 0.0) + BESIDE_HOLE * length) ** 2).any())
+def _is_in_line(points: np.ndarray, hole: LeftOut, origin: np.ndarray, length: float) -> bool:
+    """Whether the points (N, 3) from an origin (3,) near a hole, as of a column, are in line with its middle."""
+    size, away = hole.size or 0.0, points + origin - np.array(hole.where)
+    reach, far = size + BESIDE_HOLE * length, np.linalg.norm(away, axis=1)
+    if not (far <= reach).any():
+        return False
+    near = away[far <= 2.0 * reach]  # so much of a column that it is longer than wide
+    middle = near.mean(axis=0)
+    axis = np.linalg.svd(near - middle, full_matrices=False)[2][0]
+    return bool(np.linalg.norm(middle - (middle @ axis) * axis) <= OFF_AXIS * size)
 
 
 def is_empty_within(curve: np.ndarray, points: np.ndarray, edge: np.ndarray | None = None) -> bool:
