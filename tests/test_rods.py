@@ -536,3 +536,14 @@ def test_a_flat_strip_in_the_plane_of_a_sheet_is_no_rod_and_one_across_it_is() -
     rods = rods_of(points + rng.normal(0.0, 0.004, points.shape), 1.0)
     assert not rods[: len(table) + len(strip)].any(where=np.abs(points[: -len(post), 0]) < 1.0)
     assert rods[-len(post) :][post[:, 2] > 0.3].mean() > 0.95
+
+
+def test_legs_below_the_edge_of_a_sheet_are_rods_though_they_lie_in_its_plane() -> None:
+    rng = np.random.default_rng(15)
+    shell = np.column_stack([rng.uniform(-6, 6, 30_000), np.zeros(30_000), rng.uniform(0, 6, 30_000)])
+    along = rng.uniform(0.0, 3.0, 3000)
+    legs = np.column_stack([rng.uniform(-0.06, 0.06, 3000) + np.tile([-4, -2, 0, 2, 4], 600), np.zeros(3000), -along])
+    legs[:, 0] += np.repeat([-0.3, 0.3], 1500) * along
+    points = np.concatenate([shell, legs])
+    rods = rods_of(points + rng.normal(0.0, 0.004, points.shape), 1.0)
+    assert rods[-len(legs) :].mean() > 0.5 and not rods[: len(shell)][shell[:, 2] > 0.5].any()

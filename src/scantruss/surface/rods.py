@@ -32,6 +32,9 @@ JUNCTIONS_LOOKED_AT = 8  # places of a group of rods at which it may go on as a 
 FLAT_ACROSS = 0.1  # largest variance across a strip, in that over its width; half a tube has 0.19
 PLACES_OF_STRIP = 16  # places of a strip at which it is looked at, at most
 FILLED_ACROSS = 0.3  # least variance across the points around a place of a strip, in that along it; of half a disc 0.28
+LEAST_BESIDE = (
+    0.15  # share of the samples of a sheet in the plane of a patch that lie on each side of its middle, least
+)
 PARTS_OF_FOOT = 4  # parts of its length at which it is looked at how wide a foot is
 # width of a foot at its sheet, in that at its tip, at least; its last step from part to part, in all that it widens, at most
 WIDER_AT_SHEET, EVENLY_WIDER = 1.6, 0.8
@@ -153,7 +156,7 @@ def _arms(found: Linked, rod: np.ndarray, length: float) -> np.ndarray:
 
 
 def _patches(found: Linked, rod: np.ndarray, length: float) -> np.ndarray:
-    """Return which samples (S,) bool are of patches of a sheet that nothing joins to it, as beyond a shadow: flat, in its plane."""
+    """Return which samples (S,) bool are of patches amid a sheet that nothing joins to it, as beyond a shadow: flat, in its plane."""
     patch = np.zeros(len(rod), np.bool_)
     if not rod.any():
         return patch
@@ -172,7 +175,9 @@ def _patches(found: Linked, rod: np.ndarray, length: float) -> np.ndarray:
         in_plane = ~rod & (np.abs((found.mean - middle) @ axes[:, 0]) < END_OFFSET * length)
         in_plane &= ((found.mean > low) & (found.mean < high)).all(axis=1)
         level = np.abs(normals[in_plane] @ axes[:, 0]) > LEVEL_WITH_SHEET
-        patch |= own & (level.sum() >= max(SAMPLES_OF_SHEET, 0.5 * len(level)))
+        if level.sum() >= max(SAMPLES_OF_SHEET, 0.5 * len(level)):
+            beyond = ((found.mean[in_plane][level] - middle) @ axes[:, 1:] > 0.0).mean(axis=0)
+            patch |= own & bool((np.abs(beyond - 0.5) < 0.5 - LEAST_BESIDE).all())
     return patch
 
 
