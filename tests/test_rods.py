@@ -12,6 +12,7 @@ import pytest
 from typed import known
 
 import scantruss as st
+from scantruss.attempts.looks import stands_on_columns
 from scantruss.attempts.table import attempts
 from scantruss.check.distances import boxes_of
 from scantruss.check.gaps import openings_closed
@@ -139,10 +140,21 @@ def test_the_edge_of_a_roof_does_not_run_down_its_columns() -> None:
 @pytest.mark.parametrize(("reason", "words"), [(ROD, "where a column"), (KEPT, "shorter members leave it open")])
 def test_a_place_that_was_closed_under_a_column_is_no_opening(reason: int, words: str) -> None:
     """Shorter members do not open it."""
-    samples = cast(SurfaceSamples, SimpleNamespace(scan=np.zeros((5, 3)), judged=np.full(5, reason), origin=np.ones(3)))
-    hole = LeftOut("hole", 1, 0.0, (1.5, 1.0, 1.0), 0.8)
+    below = np.linspace([0.0, 0.0, -2.0], [0.0, 0.0, -0.5], 5)
+    samples = cast(SurfaceSamples, SimpleNamespace(scan=below, judged=np.full(5, reason), origin=np.ones(3)))
+    hole = LeftOut("hole", 1, 0.0, (1.2, 1.0, 1.0), 0.8)
     (warning,) = openings_closed([hole], [], samples, LENGTH, "m")
     assert words in warning.words and "0.8 m" in warning.words and warning.where == hole.where
+
+
+def test_a_place_under_a_column_and_an_opening_are_said_apart() -> None:
+    """An opening beside a column is not that of the column."""
+    below = np.linspace([0.0, 0.0, -4.0], [0.0, 0.0, -0.5], 50)
+    samples = cast(SurfaceSamples, SimpleNamespace(scan=below, judged=np.full(50, ROD), origin=np.ones(3)))
+    holes = [LeftOut("hole", 1, 0.0, (x, 1.0, 1.3), 0.8) for x in (1.1, 1.6)]
+    column, opening = openings_closed(holes, [], samples, LENGTH, "")
+    assert column.words == "closes a place 0.8 across, where a column or the like was left out"
+    assert opening.words == "closes an opening 0.8 across; shorter members leave it open"
 
 
 def test_of_a_large_opening_that_is_closed_shorter_members_may_leave_it_open() -> None:
@@ -468,3 +480,70 @@ def test_no_place_that_was_closed_is_none_of_a_column() -> None:
     samples = cast(SurfaceSamples, SimpleNamespace(scan=np.zeros((5, 3)), judged=np.full(5, ROD), origin=np.ones(3)))
     (warning,) = openings_closed([LeftOut("hole", 1, 0.0, None, 0.8, number=6)], [], samples, LENGTH, "m")
     assert warning.words == "closes an opening 0.8 m across (6 such places); shorter members leave it open"
+
+
+def hall_on_a_wide_floor() -> np.ndarray:
+    """Six bays of a groin vault on two columns, over a floor that is larger and denser than the vault."""
+    rng = np.random.default_rng(12)
+    x, y = rng.uniform(0, 18, 30_000), rng.uniform(0, 12, 30_000)
+    a, b = x % 6 - 3, y % 6 - 3
+    vault = np.column_stack([x, y, 4 + np.sqrt(9 - np.minimum(np.abs(a), np.abs(b)) ** 2)])
+    floor = np.column_stack([rng.uniform(-1, 19, 70_000), rng.uniform(-1, 13, 70_000), np.zeros(70_000)])
+    columns = [pole(rng, x, 6, 0.0, 4.3, 0.35, 2500) for x in (6, 12)]
+    points = np.concatenate([vault, floor, *columns])
+    return points + rng.normal(0.0, 0.01, points.shape)
+
+
+@pytest.mark.parametrize("length", [0.6, 0.9, 1.1, 1.12, 1.3])
+def test_whether_a_hall_stands_on_columns_does_not_hang_on_its_floor_or_the_length(length: float) -> None:
+    cloud = st.PointCloud.from_array(hall_on_a_wide_floor(), unit="m")
+    settings = st.Settings(length=length)
+    without = sample_surface(cloud, settings.replace(keep_rods=False))
+    assert stands_on_columns(cloud, settings) and without.floor is not None and len(without.pieces) == 1
+
+
+def umbrellas(thick: float) -> np.ndarray:
+    """Four inverted umbrellas on columns of one diameter, of more and of fewer points; the shells come down to them."""
+    rng = np.random.default_rng(13)
+    parts = []
+    for x, y, count in ((0, 0, 1400), (9, 0, 900), (0, 9, 700), (9, 9, 1800)):
+        u, v = rng.uniform(-4, 4, (2, 8000))
+        z = 4 + 1.8 * (1 - (1 - np.abs(u) / 4) * (1 - np.abs(v) / 4))
+        parts += [np.column_stack([x + u, y + v, z]), pole(rng, x, y, 0.0, 4.0, thick / 2, count)]
+    points = np.concatenate(parts)
+    return points + rng.normal(0.0, 0.02, points.shape)
+
+
+@pytest.mark.parametrize("length", [0.4, 0.5, 0.6, 0.85])
+def test_columns_of_one_diameter_are_all_left_out(length: float) -> None:
+    points = umbrellas(0.5)
+    cloud = st.PointCloud.from_array(points)
+    samples = sample_surface(cloud, st.Settings(length=length, keep_rods=False))
+    column = points[:, 2] < 3.5
+    assert stands_on_columns(cloud, st.Settings(length=length))
+    assert (samples.judged[column] == ROD).mean() > 0.97
+    assert (samples.judged[points[:, 2] > 4.8] == ROD).mean() < 0.01
+
+
+def test_a_flat_strip_in_the_plane_of_a_sheet_is_no_rod_and_one_across_it_is() -> None:
+    """A table beyond the shadow of what stands on it, and one side of a column that stands on it."""
+    rng = np.random.default_rng(14)
+    table = np.column_stack([rng.uniform(-6, 6, (40_000, 2)), np.zeros(40_000)])
+    table = table[(np.abs(table[:, 0]) > 1.2) | (np.abs(table[:, 1]) > 3.0)]
+    strip = np.column_stack([rng.uniform(-0.25, 0.25, 800), rng.uniform(-2, 2, 800), np.zeros(800)])
+    post = strip[:, [0, 2, 1]] + [3.5, 3.5, 2.0]
+    points = np.concatenate([table, strip, post])
+    rods = rods_of(points + rng.normal(0.0, 0.004, points.shape), 1.0)
+    assert not rods[: len(table) + len(strip)].any(where=np.abs(points[: -len(post), 0]) < 1.0)
+    assert rods[-len(post) :][post[:, 2] > 0.3].mean() > 0.95
+
+
+def test_legs_below_the_edge_of_a_sheet_are_rods_though_they_lie_in_its_plane() -> None:
+    rng = np.random.default_rng(15)
+    shell = np.column_stack([rng.uniform(-6, 6, 30_000), np.zeros(30_000), rng.uniform(0, 6, 30_000)])
+    along = rng.uniform(0.0, 3.0, 3000)
+    legs = np.column_stack([rng.uniform(-0.06, 0.06, 3000) + np.tile([-4, -2, 0, 2, 4], 600), np.zeros(3000), -along])
+    legs[:, 0] += np.repeat([-0.3, 0.3], 1500) * along
+    points = np.concatenate([shell, legs])
+    rods = rods_of(points + rng.normal(0.0, 0.004, points.shape), 1.0)
+    assert rods[-len(legs) :].mean() > 0.5 and not rods[: len(shell)][shell[:, 2] > 0.5].any()

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from ..check.limits import with_ridges_given_up, with_ridges_lost
 from ..errors import CertificateError, FrontError, OneSidedError, ScanTrussError
 from .limit import AttemptLimit, fails_by_front, joins_sheets, loses_limbs, only_leaves_out
-from .looks import breaks_limb, follows_more, jumps_between_walls, runs_along_rods, stands_on_columns
+from .looks import breaks_limb, follows_more, jumps_between_walls, keeps_columns, runs_along_rods, stands_on_columns
 from .lost_ridges import lost_ridges
 from .table import AS_ASKED, SECOND_LAYOUT, Attempt, attempts, layouts_of
 
@@ -131,7 +131,9 @@ class AttemptCourse:
             fewer = len(grid.certificate.warnings) < len(self._passed.certificate.warnings)
             self._passed = grid if fewer or self._around_columns else self._passed
             return
-        self._around_columns = stands_on_columns(self._cloud, attempt.settings)
+        self._around_columns = stands_on_columns(self._cloud, attempt.settings) and keeps_columns(
+            self._cloud, attempt.settings
+        )
         if self._around_columns or runs_along_rods(grid, self._cloud, attempt.settings, self._settings):
             assert self._row_begun is not None
             without = self._row_begun.settings.replace(keep_rods=False)

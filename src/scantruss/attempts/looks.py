@@ -15,7 +15,7 @@ from ..surface.chosen_samples import KEPT, LIMB, ROD
 from ..surface.samples import sample_surface
 from ..surface.shape import wall_of_surface
 from ..surface.sharp_edges import EDGE_SHARE, FEWEST_NEEDED
-from ..surface.supports import are_columns, free_columns
+from ..surface.supports import are_columns, column_stays, free_columns, lies_under_itself
 
 if TYPE_CHECKING:
     from ..errors import Place
@@ -214,8 +214,27 @@ def stands_on_columns(cloud: PointCloud, settings: Settings) -> bool:
     """Whether a shell stands on columns so thin that a grid around them is no part of it, where these are not left out yet."""
     if not settings.keep_rods or settings.method != "default":
         return False
-    surface = sample_surface(cloud, settings).surface
-    return bool(free_columns(surface.mean, surface.radius, settings.length).any())
+    samples = sample_surface(cloud, settings)
+    if samples.rings:  # columns that were cut off as limbs are columns all the same
+        samples = sample_surface(cloud, settings.replace(**NO_LIMBS))
+    surface = samples.surface
+    if free_columns(surface.mean, surface.radius, settings.length).any():
+        return True
+    if not lies_under_itself(surface.mean, settings.length):  # then there is nothing that columns stand on
+        return False
+    without = sample_surface(cloud, settings.replace(keep_rods=False))
+    rods = without.scan[without.judged == ROD]
+    shell = without.surface.mean[without.piece != (-1 if without.floor is None else without.floor)]
+    return bool(len(rods)) and are_columns(rods, shell, settings.length)
+
+
+def keeps_columns(cloud: PointCloud, settings: Settings) -> bool:
+    """Whether the settings keep any column that a shell stands on, or its floor for them: not where all are cut off as limbs."""
+    cut, without = sample_surface(cloud, settings), sample_surface(cloud, settings.replace(keep_rods=False))
+    rod = without.judged == ROD
+    return (cut.floor is None and without.floor is not None) or column_stays(
+        without.scan[rod], cut.judged[rod] == KEPT, settings.length
+    )
 
 
 def _has_more_outliers(cloud: PointCloud, settings: Settings) -> bool:
@@ -250,9 +269,7 @@ def _stands_on_rods(cloud: PointCloud, settings: Settings) -> bool:
     parts = [len(each.pieces) + len(each.not_chosen) for each in (whole, without)]
     if parts[1] > parts[0] or (cut.rough > VERY_ROUGH_SCAN and without.rough <= ROUGH_SCAN):
         return True
-    if stands_on_columns(cloud, settings):
-        return True
-    return cloud.z_is_up and are_columns(without.scan[without.judged == ROD], without.surface.mean, settings.length)
+    return stands_on_columns(cloud, settings)
 
 
 def follows_better(grid: Grid, other: Grid) -> bool:

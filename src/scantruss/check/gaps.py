@@ -44,9 +44,10 @@ PLACES_ACROSS_GAP = np.stack(np.meshgrid(*[np.linspace(-0.6, 0.6, 7)] * 2), axis
 )  # places around another [reach]
 MOST_BRIDGED = 1.2  # width of a gap that is open there from which on a grid that bridges it fails [member lengths]
 OPEN_FROM = 0.1  # distance of the boundary from the nearest point from which on a gap there is open [member lengths]
-
 WIDE_OPENING = 0.5  # longest side from which on an opening that is closed is said [member lengths]
-
+# distance from an opening within which what was left out may be why it is closed [member lengths], and that of its middle from the axis
+# of what was left out [size of the opening]
+BESIDE_HOLE, OFF_AXIS = 0.75, 0.3
 GAPS_LOOKED_AT = 500  # places that are looked at closely, those farthest from all points first
 
 
@@ -142,29 +143,38 @@ def openings_closed(
     if not wide:
         return []
     wide.sort(key=lambda hole: -(hole.size or 0.0))
-    places, count = [hole.where for hole in wide if hole.where], sum(hole.number for hole in wide)
-    more = f" ({count} such places)" if count > 1 else ""
-    what = f"{words_of_number(wide[0].size or 0.0, 3)}{unit and ' ' + unit} across"
-    relative = [(np.array(hole.where) - samples.origin, hole.size) for hole in wide if hole.where]
     left_out = ((ROD, "a column or the like was left out"), (LIMB, "a limb was cut off"))
-    why = next(
-        (
-            words
-            for judged, words in left_out
-            if relative
-            and all(_has_points_within(samples.scan[samples.judged == judged], *place) for place in relative)
-        ),
-        "",
-    )
-    words = f"closes a place {what}, where {why}{more}" if why else ""
-    small = (wide[0].size or 0.0) < SMALLEST_HOLE / math.pi * length
-    words = words or f"closes an opening {what}{more}; shorter members {'leave' if small else 'may leave'} it open"
+    said_here: list[Fault] = []
+    for judged, why in left_out:
+        points = samples.scan[samples.judged == judged]
+        own = [hole for hole in wide if hole.where and _is_in_line(points, hole, samples.origin, length)]
+        wide = [hole for hole in wide if hole not in own]
+        said_here += _closed(own, "closes a place", f", where {why}", unit)
+    small = bool(wide) and (wide[0].size or 0.0) < SMALLEST_HOLE / math.pi * length
+    then = f"; shorter members {'leave' if small else 'may leave'} it open"
+    return said_here + _closed(wide, "closes an opening", "", unit, then)
+
+
+def _closed(holes: list[LeftOut], begin: str, why: str, unit: str, then: str = "") -> list[Fault]:
+    """Return the warning of the holes that a grid closes, the largest first, by words for one; none of no hole."""
+    if not holes:
+        return []
+    places, count = [hole.where for hole in holes if hole.where], sum(hole.number for hole in holes)
+    what = f"{words_of_number(holes[0].size or 0.0, 3)}{unit and ' ' + unit} across"
+    words = f"{begin} {what}{why}{f' ({count} such places)' if count > 1 else ''}{then}"
     return [Fault("closed", words, places[0] if places else None, tuple(places[1:PLACES_KEPT]))]
 
 
-def _has_points_within(points: np.ndarray, place: np.ndarray, reach: float | None) -> bool:
-    """Whether any of the points (N, 3) lies within reach of a place (3,)."""
-    return bool((((points - place) ** 2).sum(axis=1) <= (reach or 0.0) ** 2).any())
+def _is_in_line(points: np.ndarray, hole: LeftOut, origin: np.ndarray, length: float) -> bool:
+    """Whether the points (N, 3) from an origin (3,) near a hole, as of a column, are in line with its middle."""
+    size, away = hole.size or 0.0, points + origin - np.array(hole.where)
+    reach, far = size + BESIDE_HOLE * length, np.linalg.norm(away, axis=1)
+    if not (far <= reach).any():
+        return False
+    near = away[far <= 2.0 * reach]  # so much of a column that it is longer than wide
+    middle = near.mean(axis=0)
+    axis = np.linalg.svd(near - middle, full_matrices=False)[2][0]
+    return bool(np.linalg.norm(middle - (middle @ axis) * axis) <= OFF_AXIS * size)
 
 
 def is_empty_within(curve: np.ndarray, points: np.ndarray, edge: np.ndarray | None = None) -> bool:

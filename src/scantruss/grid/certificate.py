@@ -75,7 +75,7 @@ class LeftOut:
 KINDS_LEFT_OUT = {
     "duplicates": "duplicates",
     "outliers": "set aside as outliers",
-    "rods": "columns, scaffold or cables, thinner than a member",
+    "rods": "columns, scaffold or cables, too thin for the members",
     "limbs": "on a limb, handle or neck too thin for the members, cut off at a ring",
     "slits": "in a slit too narrow for the members, filled",
     "floor": "in a floor under the others",

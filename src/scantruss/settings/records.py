@@ -166,7 +166,7 @@ class CleaningSettings(_Checked):
     )  # fmt: skip
     keep_rods: bool = _setting(
         True,
-        "keep columns, scaffold and cables, which are thinner than a member; they are left out if no grid passes with them",
+        "keep columns, scaffold and cables, which are too thin for the members; they are left out if no grid passes with them",
     )
     limb_girth: float = _setting(
         3.0,

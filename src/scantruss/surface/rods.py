@@ -32,6 +32,9 @@ JUNCTIONS_LOOKED_AT = 8  # places of a group of rods at which it may go on as a 
 FLAT_ACROSS = 0.1  # largest variance across a strip, in that over its width; half a tube has 0.19
 PLACES_OF_STRIP = 16  # places of a strip at which it is looked at, at most
 FILLED_ACROSS = 0.3  # least variance across the points around a place of a strip, in that along it; of half a disc 0.28
+LEAST_BESIDE = (
+    0.15  # share of the samples of a sheet in the plane of a patch that lie on each side of its middle, least
+)
 PARTS_OF_FOOT = 4  # parts of its length at which it is looked at how wide a foot is
 # width of a foot at its sheet, in that at its tip, at least; its last step from part to part, in all that it widens, at most
 WIDER_AT_SHEET, EVENLY_WIDER = 1.6, 0.8
@@ -83,7 +86,8 @@ def rod_points(found: Linked, points: int, length: float, supports: np.ndarray |
         rod |= ends
     rod &= _long_groups(found, rod, known, length) & ~_of_sparse_sheets(found, rod, along_line, length)
     rod &= ~_arms(found, rod, length)
-    rod &= ~_feet(found, rod)
+    rod &= ~_patches(found, rod, length) | known
+    rod &= ~_feet(found, rod) | known
     rod |= _behind_sheets(found, rod, length)
     if rod.mean() > MOST_RODS:
         rod[:] = False
@@ -140,7 +144,7 @@ def _arms(found: Linked, rod: np.ndarray, length: float) -> np.ndarray:
         return arm
     label, beside = _groups_of(found, rod), found.neighbors
     begins = np.flatnonzero(rod & ((beside >= 0) & ~rod[beside]).any(axis=1))
-    normals = np.linalg.eigh(_moments(found, ~rod, COARSE_REACH * length)[0])[1][:, :, 0]
+    normals = _sheet_normals(found, rod, length)
     for group in np.unique(label[begins]):
         own = np.flatnonzero(rod & (label == group))
         points = np.concatenate([found.grouped[found.start[one] : found.start[one + 1]] for one in own])
@@ -149,6 +153,38 @@ def _arms(found: Linked, rod: np.ndarray, length: float) -> np.ndarray:
         level = [_is_level(points, found.mean[one], COARSE_REACH * length, normals[one]) for one in at]
         arm[own] = 2 * sum(level) > len(level)
     return arm
+
+
+def _patches(found: Linked, rod: np.ndarray, length: float) -> np.ndarray:
+    """Return which samples (S,) bool are of patches amid a sheet that nothing joins to it, as beyond a shadow: flat, in its plane."""
+    patch = np.zeros(len(rod), np.bool_)
+    if not rod.any():
+        return patch
+    label = _groups_of(found, rod)
+    normals = _sheet_normals(found, rod, length)
+    for group in np.unique(label[rod]):
+        own = rod & (label == group)
+        points = _points_of(found, own)
+        if len(points) < SAMPLES_OF_SHEET:
+            continue
+        middle = points.mean(axis=0)
+        variances, axes = np.linalg.eigh(np.cov(points - middle, rowvar=False))
+        if variances[0] > FLAT_ACROSS * variances[1]:
+            continue
+        low, high = points.min(axis=0) - END_REACH * length, points.max(axis=0) + END_REACH * length
+        in_plane = ~rod & (np.abs((found.mean - middle) @ axes[:, 0]) < END_OFFSET * length)
+        in_plane &= ((found.mean > low) & (found.mean < high)).all(axis=1)
+        level = np.abs(normals[in_plane] @ axes[:, 0]) > LEVEL_WITH_SHEET
+        if level.sum() >= max(SAMPLES_OF_SHEET, 0.5 * len(level)):
+            beyond = ((found.mean[in_plane][level] - middle) @ axes[:, 1:] > 0.0).mean(axis=0)
+            patch |= own & bool((np.abs(beyond - 0.5) < 0.5 - LEAST_BESIDE).all())
+    return patch
+
+
+def _sheet_normals(found: Linked, rod: np.ndarray, length: float) -> np.ndarray:
+    """Return the normals (S, 3) of the sheet around each sample, without rods."""
+    normals: np.ndarray = np.linalg.eigh(_moments(found, ~rod, COARSE_REACH * length)[0])[1][:, :, 0]
+    return normals
 
 
 def _feet(found: Linked, rod: np.ndarray) -> np.ndarray:

@@ -28,6 +28,7 @@ MOST_IN_COLUMNS = 0.4  # share of the samples from which on they are no columns 
 # least variance in plan across a column, in that along it: a strip of a shell has less, half a tube 0.19
 LEAST_ROUND = 0.2
 OUTSIDE = 0.75  # distance from the middle of a column from which on a sample is none of it [widths]
+SHAFT = (0.05, 0.95)  # part of the points of a column between which its shaft lies, its capital and base aside
 FEWEST_OF_SHELL = 6  # fewest samples above a column, near it, that are a shell
 
 
@@ -56,8 +57,8 @@ def support_samples(found: Linked, length: float) -> np.ndarray:
 def free_columns(mean: np.ndarray, radius: float, length: float) -> np.ndarray:
     """Return the number (S,) from 1 of the column of each sample, 0 where it is of none, of a shell that may stand on no floor.
 
-    They are upright, straight, slender tubes under it. Under a body that is closed half of it lies, in whatever direction: its legs
-    and handles are none.
+    They are upright, straight, slender tubes under it. Under a body that is closed half of it lies, in whatever direction, its floor
+    aside: its legs and handles are none.
 
     Parameters
     ----------
@@ -66,7 +67,9 @@ def free_columns(mean: np.ndarray, radius: float, length: float) -> np.ndarray:
     length : desired member length [scan unit]
     """
     column, under = np.zeros(len(mean), np.int64), _under_shell(mean, length)
-    if not 0.0 < under.mean() <= MOST_UNDER + MOST_IN_COLUMNS:
+    floor = _floor_height(mean[under, 2], FLOOR_HALF_THICKNESS * length, LEAST_FLOOR_SHARE * len(mean))
+    off_floor = mean[:, 2] > (-np.inf if floor is None else floor + OFF_FLOOR * length)
+    if not under.any() or under[off_floor].mean() > MOST_UNDER + MOST_IN_COLUMNS:
         return column
     cell = max(CELL_WIDTH * length, SLAB_RADII * radius)
     slab = np.floor((mean[:, 2] - mean[:, 2].min()) / cell).astype(np.int64)
@@ -80,17 +83,18 @@ def free_columns(mean: np.ndarray, radius: float, length: float) -> np.ndarray:
         for own in np.split(which[np.argsort(group, kind="stable")], np.flatnonzero(np.diff(np.sort(group))) + 1):
             low, high = mean[own, :2].min(axis=0), mean[own, :2].max(axis=0)
             width = float((high - low).max())
-            if 0.0 < width <= WIDEST_COLUMN * length:
+            if 0.0 < width <= WIDEST_COLUMN * length / (1.0 - EVEN_WITHIN):
                 pieces.append(own)
                 shape.append((slab[own[0]], *(0.5 * (low + high)), width))
     shapes = np.array(shape).reshape(-1, 4)
     for chain in _chains(shapes, length):
-        own, width = np.concatenate([pieces[each] for each in chain]), shapes[chain, 3]
-        if _is_part_of_foot(chain, shapes, length):
+        own, widths = np.concatenate([pieces[each] for each in chain]), _without_peaks(shapes[chain, 3])
+        if np.median(widths) > WIDEST_COLUMN * length or _is_part_of_foot(chain, shapes, length):
             continue
-        if np.ptp(width) <= EVEN_WITHIN * width.max() and _is_column(mean, own, float(width.max()), length):
+        if np.ptp(widths) <= EVEN_WITHIN * widths.max() and _is_column(mean, own, float(widths.max()), length):
             column[own] = column.max() + 1
-    is_shell = (under & (column == 0)).mean() <= MOST_UNDER and (column > 0).mean() <= MOST_IN_COLUMNS
+    stands = column[off_floor] > 0
+    is_shell = (under[off_floor] & ~stands).mean() <= MOST_UNDER and stands.mean() <= MOST_IN_COLUMNS
     return column if is_shell else np.zeros_like(column)
 
 
@@ -105,6 +109,13 @@ def _chains(shape: np.ndarray, length: float) -> list[np.ndarray]:
     one, other = np.array(pairs, np.int64).reshape(-1, 2).T
     label = component_labels(len(shape), one, other) if len(shape) else one
     return [np.flatnonzero(label == each) for each in np.unique(label)]
+
+
+def _without_peaks(width: np.ndarray) -> np.ndarray:
+    """Return the widths of parts (K,) that stand on each other without what a point aside adds to one of them."""
+    both = np.pad(width, 1, "edge")
+    inside: np.ndarray = np.median([both[:-2], width, both[2:]], axis=0)
+    return inside
 
 
 def _is_part_of_foot(chain: np.ndarray, shape: np.ndarray, length: float) -> bool:
@@ -157,12 +168,28 @@ def are_columns(rods: np.ndarray, shell: np.ndarray, length: float) -> bool:
     """
     if _under_shell(shell, length).mean() > MOST_UNDER:
         return False
-    group, upright = _beside_each_other(rods[:, :2], CELL_WIDTH * length), 0
+    return 2 * sum(map(len, _uprights(rods, length))) > len(rods)
+
+
+def column_stays(rods: np.ndarray, kept: np.ndarray, length: float) -> bool:
+    """Whether most points of any upright, slender part of rods (N, 3) are kept, (N,) bool."""
+    return any(2 * kept[own].sum() > len(own) for own in _uprights(rods, length))
+
+
+def _uprights(rods: np.ndarray, length: float) -> list[np.ndarray]:
+    """Return the numbers of the points (N, 3) of each upright, slender part of rods; a capital and a base are no wider part of it."""
+    group, uprights = _beside_each_other(rods[:, :2], CELL_WIDTH * length), []
     for each in np.unique(group):
-        own = rods[group == each]
-        width, height = np.ptp(own[:, :2], axis=0).max(), np.ptp(own[:, 2])
-        upright += len(own) * bool(width <= WIDEST_SUPPORT * length and height >= LEAST_SLENDER * width)
-    return 2 * upright > len(rods)
+        own = np.flatnonzero(group == each)
+        width = np.ptp(np.quantile(rods[own, :2], SHAFT, axis=0), axis=0).max()
+        if width <= WIDEST_SUPPORT * length and np.ptp(rods[own, 2]) >= max(LEAST_SLENDER * width, length):
+            uprights.append(own)
+    return uprights
+
+
+def lies_under_itself(mean: np.ndarray, length: float) -> bool:
+    """Whether any of the samples (S, 3) of a scan lies under others, as columns do, or the floor they stand on."""
+    return bool(_under_shell(mean, length).any())
 
 
 def floor_below(mean: np.ndarray, length: float) -> float | None:
