@@ -30,7 +30,7 @@ from scantruss.report import ladder
 from scantruss.report.advice import Advice
 from scantruss.report.ladder import HOPELESS_NEARBY, LEAST_TRIED, MOST_TRIED, SURE_PER_SPACING, TRIED_AROUND
 from scantruss.report.length_trial import LengthTrial, settled
-from scantruss.report.lengths import advice_lines, advice_rows, result_of, usual_cause
+from scantruss.report.lengths import accepted_line, advice_lines, advice_rows, result_of, usual_cause
 from scantruss.scan.member_length import length_range, round_length, suggest_length
 from scantruss.surface.samples import SurfaceSamples
 
@@ -372,6 +372,30 @@ def test_a_length_that_loses_little_is_suggested_where_the_next_above_passes_at_
     monkeypatch.setattr(Advice, "try_length", tried)
     advice = Advice(cloud_of("limpet"), st.Settings(length=1.0))
     assert (advice.suggest() == advice._usual) == at_last
+
+
+@pytest.mark.parametrize(
+    ("lost", "said"),
+    [
+        ((0.12, 0.099, 0.095), ["2 --allow-missing 0.1"]),
+        ((0.04, 0.09, 0.12), ["1 --allow-missing 0.04"]),
+        ((0.4, 0.5), []),
+    ],
+)
+def test_where_only_thin_limbs_are_missing_the_option_that_accepts_that_is_named(
+    lost: tuple[float, ...], said: list[str]
+) -> None:
+    """Of lengths that lose about as much the shortest, as it follows more of the rest."""
+
+    def missing(length: float, share: float, *more: Fault) -> LengthTrial:
+        found = Certificate(
+            "", 0.5, True, True, 1, 1, 1, 1, 1, 0, missing=share, faults=(Fault("cover", "leaves out"), *more)
+        )
+        found = replace(found, left_out=(LeftOut("limbs", 9, share),))
+        return LengthTrial(length, None, st.CertificateError("it fails", cast(Any, SimpleNamespace(certificate=found))))
+
+    trials = [missing(0.5, 0.01, Fault("torn", "is torn")), *(missing(k, share) for k, share in enumerate(lost, 1))]
+    assert accepted_line(trials) == [f"with --length {each} a grid without its thin limbs passes" for each in said]
 
 
 def refused_with(crossings: int) -> st.CertificateError:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
@@ -11,7 +10,7 @@ import numpy as np
 
 from ..boundary.find import find_boundary
 from ..cells.make import settings_of_triangles
-from ..check.refusal import MOST_ACCEPTED
+from ..check.refusal import MOST_ACCEPTED, option_accepting
 from ..constraints.find import ridges_away_from, ridges_given_up, wide_folds
 from ..constraints.ridges import FAULT_REACH
 from ..errors import CertificateError, FrontError, words_of_place
@@ -106,7 +105,7 @@ class Attempt:
         if not only_leaves_out(fault):
             return ""
         found = fault.whole.grid.certificate
-        allowing = f"--allow-missing {math.ceil(100.0 * found.missing) / 100.0:g}"
+        allowing = option_accepting(found)
         if self.settings.smooth_scale and found.missing <= MOST_ACCEPTED:
             smooth = f"--smooth-scale {self.settings.smooth_scale:g} --ridge-angle 0"
             return f"with {smooth} {allowing} a grid of its mean surface passes, {_dropping(found)}"

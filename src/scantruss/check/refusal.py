@@ -47,6 +47,11 @@ def _listed(words: list[str]) -> str:
     return ", ".join(words[:-1]) + f" and {words[-1]}" if len(words) > 1 else words[0]
 
 
+def option_accepting(found: Certificate) -> str:
+    """Return the option with which what a grid misses of the scan is accepted."""
+    return f"--allow-missing {math.ceil(100.0 * found.missing) / 100.0:g}"
+
+
 def _way_out(found: Certificate) -> str:
     """Return what gives a grid all the same: the setting that accepts what is wrong if that alone is, else `--keep-failed`."""
     kinds = {fault.kind for fault in found.faults}
@@ -62,5 +67,5 @@ def _way_out(found: Certificate) -> str:
     if "hanging" in kinds or kinds == {"spike"}:
         return "--crop or --piece leaves out what lies off the surface, shorter members keep to it; --keep-failed gives it all the same"
     if kinds == {"cover"} and found.missing > 0.0:
-        return f"{f'{LIMBS_KEPT}, ' * limbs}--allow-missing {math.ceil(100.0 * found.missing) / 100.0:g} accepts that"
+        return f"{f'{LIMBS_KEPT}, ' * limbs}{option_accepting(found)} accepts that"
     return "--keep-failed gives it all the same"

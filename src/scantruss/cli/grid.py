@@ -250,13 +250,15 @@ def nearby_words(
 ) -> str:
     """Name the nearest length at which a grid passes, tried by quick runs; nothing if lengths vary over the scan."""
     from ..report.advice import Advice
+    from ..report.lengths import accepted_line
 
     if settings.length_field:
         return ""
     unit = f" {cloud.unit}" if cloud.unit else ""
     if advice is not None and advice.tried and not advice.passes:
         lengths = f"{advice.tried[0].length:g} to {advice.tried[-1].length:g}{unit}"
-        return f"; no grid passes with the lengths tried, {lengths}, either: clean or crop the scan where it fails"
+        way_out = accepted_line(advice.tried) or ["clean or crop the scan where it fails"]
+        return f"; no grid passes with the lengths tried, {lengths}, either: {way_out[0]}"
     if (length := Advice(cloud, settings, bars).nearby(settings.length, refused)) is not None:
         return f"; a grid passes with --length {length:g} ({f'{cloud.unit}, ' if cloud.unit else ''}tried with --effort quick)"
     return (

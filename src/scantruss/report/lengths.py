@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..attempts.limit import only_leaves_out
+from ..check.refusal import MOST_ACCEPTED, option_accepting
 from ..errors import words_of_number, words_of_place
 
 if TYPE_CHECKING:
@@ -14,6 +16,7 @@ if TYPE_CHECKING:
     from .advice import Advice
     from .length_trial import LengthTrial
 
+LIMBS_ALIKE = 1.1  # ratio of the shares of the scan on thin limbs up to which they are alike
 MOST_WORDS = 2  # kinds of loss, or faults, that are named for a length
 
 
@@ -108,9 +111,24 @@ def advice_lines(advice: Advice, length: float, cloud: PointCloud) -> list[str]:
         near = advice.nearby(length) if near is None and not advice.is_spent else near
         lines += [f"at {length:g}{unit}: {_no_grid(trial)}: {_why(trial)}{place}"]
         lines += [f"try --length {near:g}" if near else f"no length passes of those tried{usual_cause(advice.tried)}"]
+        lines += [] if near else accepted_line(advice.tried)
     else:
         lines.append(f"try --length {length:g}")
     return lines
+
+
+def accepted_line(trials: list[LengthTrial]) -> list[str]:
+    """Return a length whose grid only misses thin limbs, the shortest of those alike, and the option that accepts that; else nothing."""
+    without_limbs = [
+        (trial.length, trial.fault.grid.certificate)
+        for trial in trials
+        if trial.loses_limbs and trial.fault is not None and only_leaves_out(trial.fault)
+    ]
+    least = min((found.missing for _, found in without_limbs), default=1.0)
+    if least > MOST_ACCEPTED:
+        return []
+    length, found = next(each for each in without_limbs if each[1].missing <= LIMBS_ALIKE * least)
+    return [f"with --length {length:g} {option_accepting(found)} a grid without its thin limbs passes"]
 
 
 def usual_cause(trials: list[LengthTrial]) -> str:
