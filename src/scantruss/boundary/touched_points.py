@@ -9,15 +9,12 @@ import numpy as np
 from ..kernels.boundary import loops as kernels
 from ..kernels.surface.local_surface import Surface
 from ..runtime.parallel import in_parts
-from ..scan.vectors import dots
 from ..surface.samples import SurfaceSamples, with_whole_boundary
 from ..surface.scratch import with_own_scratch
 from .curves import resample, smooth_turns
 from .density import SlidingDisc, density_along, reach_of_density
 
 STEPS_BACK = 16  # a boundary point touched again within this many steps was never left
-# share of a loop's places from which the disc reaches no point, above which they are replaced, and how many times at most
-OUT_OF_DISC, MOST_REPLACED = 0.05, 3
 PLACES_PER_THREAD = 500  # fewest places of a loop that are worth a thread
 
 
@@ -37,8 +34,6 @@ def boundary_points(
             kernels.come_nearer(surface, places, near)
     reach = reach_of_density(surface, samples.area)
     radii = [disc.radii(density_along(surface, places, reach)) for places, _ in along]
-    along = [_within_reach(surface, *each, wide, step) for each, wide in zip(along, radii, strict=True)]
-    radii = [disc.radii(density_along(surface, places, reach)) for places, _ in along]
     touched = [_touch_points(surface, *each, wide, 8) for each, wide in zip(along, radii, strict=True)]
     dense = with_whole_boundary(samples, surface, np.concatenate(touched)) if touched else surface
     if dense is not surface:
@@ -57,34 +52,6 @@ def _places_along(surface: Surface, loop: np.ndarray, step: float) -> tuple[np.n
     places = resample(turns, step)
     at = (np.arange(len(places)) + 0.5) * (arc[-1] / len(places))
     return places, loop[np.searchsorted(arc, at, side="right").clip(1, len(loop)) - 1]
-
-
-def _within_reach(
-    surface: Surface, places: np.ndarray, near: np.ndarray, radii: np.ndarray, step: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return places (M, 3) along a loop from which the disc reaches a point, and the sample near each (M,).
-
-    A loop of few samples cuts off the ends of a narrow opening: the disc reaches nothing from there. The points that it touches from the
-    other places lead around these ends.
-    """
-    for _ in range(MOST_REPLACED):
-        touched = _touch_points(surface, places, near, radii, 8)
-        found = (touched != places).any(axis=1)
-        if found.mean() > 1.0 - OUT_OF_DISC or found.sum() < 3:
-            break
-        touched, near, radii = touched[found], near[found], radii[found]
-        places = resample(smooth_turns(touched[_onwards(touched)]), step)
-        nearest = np.linalg.norm(places[:, None] - touched, axis=2).argmin(axis=1)
-        radii = radii[nearest]
-        near = np.array([_near_sample(surface, *each) for each in zip(places, near[nearest], strict=True)], np.int64)
-    return places, near
-
-
-def _near_sample(surface: Surface, place: np.ndarray, facing: int) -> int:
-    """Return the sample nearest to a place (3,) among those that face the same side as one of them, though no links lead there."""
-    away = surface.mean - place
-    squares = np.where(surface.normals @ surface.normals[facing] > 0.0, dots(away, away), np.inf)
-    return int(squares.argmin())
 
 
 def _in_order(touched: np.ndarray, step: float) -> np.ndarray:

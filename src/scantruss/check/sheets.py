@@ -33,6 +33,7 @@ MOST_LINKS = 1000  # most that are looked at
 MIDDLE_OFF, SPACINGS_OFF, FACES_ALIKE = 0.25, 2.0, 0.5
 # gap between points of one side of a break, and distance from it of those beside it [member lengths]
 BESIDE_BREAK = 0.25
+BETWEEN_SIDES = 0.9  # least distance between its sides: some of what is missed is a member off both [member lengths]
 SPACINGS_BESIDE_BREAK = 1.5  # ... and in spacings of the points
 FEWEST_BESIDE_BREAK = 6  # fewest points of a side of a break, and of a stub
 # least share of the points beside a part of a scan that each side of it has where a grid ends on both: at a bush nearly all are on one
@@ -101,11 +102,11 @@ def broken_limb(
     distance : (N,) of each point from the grid [scan unit]
     share : least share of the points beside the part that each side has
     """
-    from scipy.spatial import cKDTree
-
     gone = np.flatnonzero(limb & (distance > 0.5 * length))
     if not (distance[gone] > length).any():
         return None
+    from scipy.spatial import cKDTree  # which grids that miss nothing do not load
+
     apart = max(BESIDE_BREAK * length, SPACINGS_BESIDE_BREAK * samples.spacing)
     followed = np.flatnonzero((samples.judged == KEPT) & (distance <= 0.5 * length))
     group = points_together(samples.scan[gone], np.full(len(gone), apart))
@@ -115,7 +116,7 @@ def broken_limb(
         beside = samples.scan[followed[np.isfinite(away)]]
         if not len(beside):
             continue
-        sides = np.bincount(points_together(beside, np.full(len(beside), apart)))
+        sides = np.bincount(points_together(beside, np.full(len(beside), max(apart, BETWEEN_SIDES * length))))
         if (sides >= max(FEWEST_BESIDE_BREAK, share * len(beside))).sum() > 1:
             middle = part[((part - part.mean(axis=0)) ** 2).sum(axis=1).argmin()]
             return place_of(middle + samples.origin)

@@ -276,7 +276,6 @@ def touch_points(
     noise = 0.35 * surface.length
     for m in range(begin, end):
         sample, place, radius = samples[m], row(places, m), radii[m]
-        across = surface.radius + 1.5 * radius
         normal = row(surface.normals, sample)
         out = unit(cross(row(ahead, m), normal))
         side = cross(normal, out)
@@ -292,8 +291,6 @@ def touch_points(
                 y, h = dot(d, side), dot(d, normal)
                 if abs(y) < radius and abs(h) < noise:
                     x = dot(d, out)
-                    if x > across:  # at the other side of a narrow opening
-                        continue
                     t = x + math.sqrt(radius * radius - y * y)
                     if t > best + 1e-9 * radius:  # the first of equals, whatever the rounding
                         best = t
