@@ -547,3 +547,11 @@ def test_legs_below_the_edge_of_a_sheet_are_rods_though_they_lie_in_its_plane() 
     points = np.concatenate([shell, legs])
     rods = rods_of(points + rng.normal(0.0, 0.004, points.shape), 1.0)
     assert rods[-len(legs) :].mean() > 0.5 and not rods[: len(shell)][shell[:, 2] > 0.5].any()
+
+
+def test_a_few_points_that_look_like_a_column_are_none_where_z_may_not_be_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As on the steep face of a quarry: 34 of 33,000."""
+    cloud, settings = st.PointCloud.from_array(umbrellas(0.5)), st.Settings(length=0.85)
+    assert stands_on_columns(cloud, settings) and not cloud.z_is_up
+    monkeypatch.setattr("scantruss.attempts.looks.LEAST_IN_COLUMNS", 0.5)
+    assert not stands_on_columns(cloud, settings)

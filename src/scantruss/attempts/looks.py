@@ -36,6 +36,7 @@ NOISE_AS_WALLS = 0.025  # noise from which on it looks like walls: at walls it i
 # share of the distance within which a twentieth of the points is not, down to which a grid follows a scan plainly better than another
 PLAINLY_NEARER = 0.75
 MISSING_ALIKE = 0.005  # share of the scan by which a grid may miss more than another and still follow it as far
+LEAST_IN_COLUMNS = 0.005  # least share of a scan in the columns that it stands on where z may not be up
 BESIDE_RODS = 0.5  # distance from a rod within which the place of a warning is beside it [member lengths]
 # by how much nearer a hundredth of the points must lie, in members, where members are unevener by 1 (std of their lengths / mean)
 NEARER_FOR_UNEVENER = 2.0
@@ -225,7 +226,9 @@ def stands_on_columns(cloud: PointCloud, settings: Settings) -> bool:
     without = sample_surface(cloud, settings.replace(keep_rods=False))
     rods = without.scan[without.judged == ROD]
     shell = without.surface.mean[without.piece != (-1 if without.floor is None else without.floor)]
-    return bool(len(rods)) and are_columns(rods, shell, settings.length)
+    if not len(rods) or not (cloud.z_is_up or len(rods) >= LEAST_IN_COLUMNS * len(without.scan)):
+        return False
+    return are_columns(rods, shell, settings.length)
 
 
 def keeps_columns(cloud: PointCloud, settings: Settings) -> bool:
