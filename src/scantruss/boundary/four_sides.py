@@ -119,10 +119,9 @@ def _off_ellipse(flat: np.ndarray) -> float:
     """Return the distance (rms) of places (N, 2) from the ellipse that fits them, about."""
     size = float(np.abs(flat).max())
     x, y = flat.T / size
-    xx, xy, yy, x1, y1 = found = np.linalg.lstsq(
-        np.column_stack([x * x, x * y, y * y, x, y]), np.ones(len(x)), rcond=None
-    )[0]
-    value = np.column_stack([x * x, x * y, y * y, x, y]) @ found - 1.0
+    terms = np.column_stack([x * x, x * y, y * y, x, y])
+    xx, xy, yy, x1, y1 = found = np.linalg.lstsq(terms, np.ones(len(x)), rcond=None)[0]
+    value = terms @ found - 1.0
     slope = np.hypot(2 * xx * x + xy * y + x1, xy * x + 2 * yy * y + y1)
     return float(np.sqrt(np.mean((size * value / np.maximum(slope, 1e-9)) ** 2)))
 

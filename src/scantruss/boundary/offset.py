@@ -191,7 +191,7 @@ def _corners(
     curve: np.ndarray, bias: SamplingBias, density: np.ndarray, settings: Settings, surface: Surface
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return where a curve through boundary points has corners, and their places; not those in bays that random sampling explains."""
-    four = corners_of_four_sides(curve, surface, bias.density)
+    four = corners_of_four_sides(curve, surface, bias.density) if settings.method == "default" else np.zeros((0, 3))
     if len(four):
         at = np.linalg.norm(curve[:, None] - four, axis=2).argmin(axis=0)
         return np.sort(at), four[at.argsort()]

@@ -33,8 +33,8 @@ MOST_LINKS = 1000  # most that are looked at
 MIDDLE_OFF, SPACINGS_OFF, FACES_ALIKE = 0.25, 2.0, 0.5
 # gap between points of one side of a break, and distance from it of those beside it [member lengths]
 BESIDE_BREAK = 0.25
-BETWEEN_SIDES = 0.9  # least distance between its sides: some of what is missed is a member off both [member lengths]
 SPACINGS_BESIDE_BREAK = 1.5  # ... and in spacings of the points
+BETWEEN_SIDES = 0.9  # least distance between its sides: some of what is missed is a member off both [member lengths]
 FEWEST_BESIDE_BREAK = 6  # fewest points of a side of a break, and of a stub
 # least share of the points beside a part of a scan that each side of it has where a grid ends on both: at a bush nearly all are on one
 SHARE_OF_SIDE = 0.2
@@ -118,8 +118,7 @@ def broken_limb(
             continue
         sides = np.bincount(points_together(beside, np.full(len(beside), max(apart, BETWEEN_SIDES * length))))
         if (sides >= max(FEWEST_BESIDE_BREAK, share * len(beside))).sum() > 1:
-            middle = part[((part - part.mean(axis=0)) ** 2).sum(axis=1).argmin()]
-            return place_of(middle + samples.origin)
+            return _place_amid(part, samples)
     return None
 
 
@@ -150,9 +149,13 @@ def webbed_limb(
         missed = own & (distance[limb] > COVER_REACH * length)
         wrong = limb[stub & own] if is_thin else limb[missed] if len(rings) > 1 else limb[:0]
         if min(len(wrong), (stub & own).sum()) >= FEWEST_BESIDE_BREAK:
-            places = samples.scan[wrong]
-            return place_of(places[((places - places.mean(axis=0)) ** 2).sum(axis=1).argmin()] + samples.origin)
+            return _place_amid(samples.scan[wrong], samples)
     return None
+
+
+def _place_amid(places: np.ndarray, samples: SurfaceSamples) -> Place | None:
+    """Return the one of some places (K, 3) that is nearest to their middle [scan unit]."""
+    return place_of(places[((places - places.mean(axis=0)) ** 2).sum(axis=1).argmin()] + samples.origin)
 
 
 def disconnected_place(grid: Grid, samples: SurfaceSamples, nearest: np.ndarray, length: float) -> np.ndarray | None:

@@ -32,9 +32,8 @@ JUNCTIONS_LOOKED_AT = 8  # places of a group of rods at which it may go on as a 
 FLAT_ACROSS = 0.1  # largest variance across a strip, in that over its width; half a tube has 0.19
 PLACES_OF_STRIP = 16  # places of a strip at which it is looked at, at most
 FILLED_ACROSS = 0.3  # least variance across the points around a place of a strip, in that along it; of half a disc 0.28
-LEAST_BESIDE = (
-    0.15  # share of the samples of a sheet in the plane of a patch that lie on each side of its middle, least
-)
+# least share of the samples of a sheet in the plane of a patch that lie on each side of its middle
+LEAST_BESIDE = 0.15
 PARTS_OF_FOOT = 4  # parts of its length at which it is looked at how wide a foot is
 # width of a foot at its sheet, in that at its tip, at least; its last step from part to part, in all that it widens, at most
 WIDER_AT_SHEET, EVENLY_WIDER = 1.6, 0.8
