@@ -47,3 +47,20 @@ def test_a_round_opening_has_no_corners(radius: float) -> None:
 def test_an_opening_with_rounded_corners_has_none_where_points_show_that_they_are_rounded() -> None:
     loop = opening_of(lambda x, y: np.hypot(np.maximum(abs(x) - 1.0, 0.0), np.maximum(abs(y) - 0.8, 0.0)) > 0.9, 5)
     assert len(loop.corners) == 0
+
+
+def test_the_method_of_the_paper_looks_for_no_four_sides(monkeypatch: pytest.MonkeyPatch) -> None:
+    looked: list[int] = []
+
+    def look(*_: object) -> np.ndarray:
+        looked.append(1)
+        return np.zeros((0, 3))
+
+    monkeypatch.setattr("scantruss.boundary.offset.corners_of_four_sides", look)
+    x, y = (each.ravel() for each in np.meshgrid(np.arange(-6.0, 6.0, 0.1), np.arange(-6.0, 6.0, 0.1)))
+    window = (abs(x) < 1.0) & (abs(y) < 0.8)
+    cloud = PointCloud(points=np.column_stack([x, y, 0 * x])[~window], origin=np.zeros(3))
+    for method, found in (("paper", False), ("default", True)):
+        settings = Settings(length=1.0, method=method)
+        find_boundary(sample_surface(cloud, settings), settings)
+        assert bool(looked) == found
