@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from small_grids import cloud_over, dome, icosahedron
+from small_grids import cloud_over, dome, icosahedron, make_grid
 from test_picture import has_colour, pixels
 from typed import xyz
 
@@ -17,7 +17,7 @@ from scantruss.export.drawing.legend import Legend, Row
 from scantruss.export.drawing.picture import encode_picture
 from scantruss.export.drawing.style import PictureStyle
 from scantruss.grid.certificate import Certificate, Fault, LeftOut
-from scantruss.grid.upward import guessed_up, known_upward
+from scantruss.grid.upward import facing_of, facing_up, guessed_up, known_upward
 
 NOTHING_FOUND = Certificate("", 1.0, True, True, 1, 1, 1, 1, 1, 0)
 
@@ -73,6 +73,40 @@ def test_a_facade_stands_whichever_way_it_faces(turn: float) -> None:
     assert guessed_up(turned) == ""
 
 
+def test_each_open_piece_that_faces_down_is_turned_over_and_a_bowl_is_not() -> None:
+    """The floor under an umbrella faced up, its roof down: in pictures one of them showed its back."""
+    roof, bowl = dome(unit="mm"), icosahedron()
+    low = bowl.nodes[:, 2] < 0.1 * np.ptp(bowl.nodes[:, 2])
+    bowl = bowl.replace(triangles=bowl.triangles[low[bowl.triangles].sum(axis=1) > 1])  # its lower half, outside down
+    number = len(roof.nodes)
+    pieces = make_grid(
+        [*roof.nodes, *(roof.nodes - [0.0, 0.0, 50.0]), *(bowl.nodes + [90.0, 0.0, 0.0])],
+        [*roof.triangles[:, ::-1], *(roof.triangles + number), *(bowl.triangles + 2 * number)],
+    )
+    faced = facing_up(pieces, cloud_over(pieces)).triangles
+    assert np.array_equal(faced[: len(roof.triangles)], roof.triangles)
+    assert np.array_equal(faced[len(roof.triangles) :], pieces.triangles[len(roof.triangles) :])
+    once = facing_up(pieces.replace(triangles=faced), cloud_over(pieces))
+    assert np.array_equal(once.triangles, faced)
+
+
+def test_a_wall_with_level_pavement_before_it_stands_and_faces_the_pavement() -> None:
+    """Without a unit it was drawn lying, with one from behind."""
+    sheet = dome()
+    ground = sheet.nodes * [1.0, 1.0, 0.0]
+    ground -= ground.min(axis=0)
+    wall = ground[:, [0, 2, 1]]  # both meet along y = 0
+    for turn in (0.0, 29.0, 61.0):
+        cos, sin = np.cos(np.radians(turn)), np.sin(np.radians(turn))
+        nodes = np.concatenate([ground, wall]) @ [[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]]
+        triangles = np.concatenate([sheet.triangles[:, ::-1], sheet.triangles + len(ground)])
+        grid = make_grid(nodes, [*triangles, (0, len(ground), 1)])  # one piece
+        assert guessed_up(grid) == ""
+        facing = facing_of(grid.nodes, facing_up(grid, cloud_over(grid)).triangles)
+        assert facing[2] > 0.3 and facing @ [-sin, cos, 0.0] > 0.3
+        assert choose_camera(nodes, grid.triangles).ground @ [0.0, 0.0, 1.0] == pytest.approx(1.0)
+
+
 def test_a_level_floor_under_a_grid_tells_that_z_is_up() -> None:
     body = icosahedron()
     body = body.replace(nodes=body.nodes * [1.0, 2.0, 1.0])
@@ -84,7 +118,7 @@ def test_a_level_floor_under_a_grid_tells_that_z_is_up() -> None:
 def test_a_picture_with_a_guessed_axis_up_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     body = icosahedron()
     body = body.replace(nodes=body.nodes * [1.0, 2.0, 1.0])
-    assert any("shows y up" in text.words for text in texts_of(body, monkeypatch))
+    assert any("shows y up" in text.words and "--unit m" in text.words for text in texts_of(body, monkeypatch))
     assert not any("up" in text.words for text in texts_of(dome(unit="m"), monkeypatch))
 
 

@@ -297,6 +297,29 @@ def test_what_has_unlike_ends_stands_on_one_of_them_with_y_or_z_up(nodes: Any, o
     assert np.array_equal(likely_upward(turned, facing), np.eye(3)[axis])
 
 
+def test_a_flat_foot_counts_before_a_flat_back_and_small_feet_count() -> None:
+    """An angel whose robe is open below lay on its face, as its wings are flat behind; an animal on small feet stood on its head."""
+    robe = turned_profile([2.0, 1.0, 1.0], [0, 6, 7])
+    head = [[0.0, 0.0, 8.0], [0.0, -2.1, 1.0]]
+    wings = np.array([[x, 2.2, z] for x in (-5.0, -3.0, 3.0, 5.0) for z in (4.0, 7.0)])
+    assert np.array_equal(likely_upward(np.concatenate([robe, head, wings]), np.zeros(3)), [0, 0, 1])
+    body = icosahedron().nodes * [0.4, 0.9, 1.0]
+    feet = np.array([[x, y, -14.0] for x in (-1.0, 1.0) for y in (-2.0, 3.0)])
+    animal = np.concatenate([body, feet])
+    animal[:, 2] *= 0.4
+    assert np.array_equal(likely_upward(animal, np.zeros(3)), [0, 0, 1])
+
+
+def test_an_apse_stands_on_its_foot_and_what_faces_no_axis_has_z_up() -> None:
+    """Half a drum under a quarter of a sphere, open in front, lay on its back; a cave and a seat were drawn askew."""
+    turn, high = (axis.ravel() for axis in np.meshgrid(np.linspace(0, np.pi, 19), np.linspace(-1.0, np.pi / 2, 19)))
+    wide = np.where(high > 0, np.cos(high), 1.0)
+    rise = np.where(high > 0, np.sin(high), high)
+    apse = np.column_stack([wide * np.cos(turn), wide * np.sin(turn), rise])
+    assert np.array_equal(likely_upward(apse, np.array([0.0, 0.71, 0.15])), [0, 0, 1])
+    assert np.array_equal(likely_upward(dome().nodes, np.array([0.0, 0.5, -0.5])), [0, 0, 1])
+
+
 def test_a_long_tube_lies_and_a_vase_with_ends_alike_stands() -> None:
     tube = turned_profile(np.ones(100), np.linspace(0, 60, 100))[:, [0, 2, 1]]
     assert np.array_equal(likely_upward(tube, np.zeros(3)), [0, 0, 1])

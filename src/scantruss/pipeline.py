@@ -26,7 +26,6 @@ from .front.orientation_field import orientation_fields
 from .grid.grid import Grid
 from .grid.upward import facing_up
 from .runtime.progress import Progress, seer_of
-from .scan.checks import lies_on_map
 from .scan.cloud import PointCloud
 from .scan.member_length import check_length
 from .scan.stream.fit import read_to_fit
@@ -120,15 +119,14 @@ def grid_from_cloud(
         symmetric = symmetric_hexagons if settings.cells == "hexagon" else symmetric_grid
         part_of = partial(grid_from_cloud, progress=watch)
         grid = symmetric(cloud, settings, part_of, progress=watch, keep_failed=keep_failed)
-        return grid.replace(seconds=watch.seconds())
+        return facing_up(grid, cloud).replace(seconds=watch.seconds())
     try:
         grid = first_that_passes(cloud, settings, progress=watch)
     except CertificateError as refused:
         if not keep_failed or not len(refused.grid.triangles):
             raise
         grid = refused.grid.replace(settings=settings)
-    grid = facing_up(grid) if lies_on_map(cloud.origin, cloud.extent) else grid
-    return grid.replace(seconds=watch.seconds())
+    return facing_up(grid, cloud).replace(seconds=watch.seconds())
 
 
 def make_grid(cloud: PointCloud, attempt: Attempt, *, progress: Progress | None = None) -> Grid:
