@@ -238,15 +238,19 @@ def test_a_mesh_of_few_vertices_is_refused_with_a_way_on(
 def test_where_no_length_passes_the_most_frequent_cause_is_said_with_its_place() -> None:
     """Only that no length passes was said, and to clean or crop the scan, not what is wrong with it or where."""
 
-    def failed(length: float, *kinds: str) -> LengthTrial:
-        faults = tuple(Fault(kind, f"is {kind} at {length:g}", (length, 0.0, 1.5)) for kind in kinds)
+    def failed(length: float, *kinds: str, words: str = "") -> LengthTrial:
+        faults = tuple(Fault(kind, f"is {kind}{words}", (length, 0.0, 1.5)) for kind in kinds)
         grid = cast(Any, SimpleNamespace(certificate=SimpleNamespace(faults=faults)))
         return LengthTrial(length, None, FrontError("no grid", grid))
 
     trials = [failed(1.0, "manifold", "torn"), failed(2.0, "torn"), failed(3.0, "cover"), failed(4.0, "torn")]
-    assert (
-        usual_cause(trials) == ", 3 of 4 as the grid is torn at 2 (near 2, 0, 1.5); clean or crop the scan there first"
+    assert usual_cause(trials) == ", 3 of 4 as the grid is torn (near 2, 0, 1.5); clean or crop the scan there first"
+    unlike = [failed(2.0 * k, "loops", words=f" {k}") for k in (1, 2, 3)]  # what it says of one holds of that alone
+    assert usual_cause(unlike).startswith(
+        ", 3 of 3 for faults of one kind, as at 4: the grid is loops 2 (near 4, 0, 1.5);"
     )
+    unnamed = [failed(2.0 * k, "angle", "short", "torn") for k in (1, 2)]  # the table names two faults a length
+    assert usual_cause([*unnamed, *trials]).startswith(", 3 of 6 as the grid is torn")
     stopped = [LengthTrial(1.0, None, FrontError("the front stopped; try another", None, (0.0, 1.0, 2.0)))]
     assert usual_cause(stopped) == ", 1 of 1 as the front stopped (near 0, 1, 2); clean or crop the scan there first"
     assert usual_cause([]) == "; clean or crop the scan first"

@@ -11,7 +11,7 @@ from small_grids import dome
 
 from scantruss import Certificate, Grid, Settings
 from scantruss.check.limits import places_to_look_at
-from scantruss.errors import words_of_number
+from scantruss.errors import words_of_number, words_of_share
 from scantruss.grid.certificate import Fault, LeftOut, Spread, Worst
 from scantruss.kernels.geometry.components import component_labels
 from scantruss.report.figures import distance_lines, left_out_lines, line_lines
@@ -115,4 +115,14 @@ def test_in_a_table_words_start_and_figures_end_below_each_other(capsys: pytest.
         "length  members  a quick run",
         "2.3      22,410  not tried",
         "13           86  passes",
+    ]
+
+
+def test_a_share_that_is_not_none_is_not_said_to_be_none() -> None:
+    """6 of 200,000 points were "6 points (0.00%)"."""
+    assert [words_of_share(each) for each in (0.0, 6 / 90_000, 6 / 200_000, 0.1234)] == [
+        "0.00%",
+        "0.01%",
+        "less than 0.01%",
+        "12.34%",
     ]

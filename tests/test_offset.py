@@ -264,7 +264,7 @@ def test_where_random_points_leave_the_corners_in_doubt_it_is_said_with_a_length
         found = re.search(r"corners may be missed or false; longer members, from (\S+) m,", capsys.readouterr().err)
         assert (found is not None) == doubt
         if found is not None:
-            assert 0.62 < float(found[1]) < 1.3
+            assert 1.1 * 0.62 <= float(found[1]) < 1.3  # hardly longer ones are not worth a word
             assert main(["info", str(tmp_path / "a.npy"), "--length", "1.3", "--unit", "m"]) == 0
             assert "may be none" not in capsys.readouterr().err
 

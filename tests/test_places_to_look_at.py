@@ -459,7 +459,12 @@ def test_a_refusal_names_the_setting_that_accepts_it_only_where_that_is_enough()
         (
             (angle, short, cover, angle),
             0.121,
-            "the grid has an angle, is short and leaves out 12.1% of the scan, and has 1 other fault;",
+            "the grid has an angle, is short, leaves out 12.1% of the scan and has an angle;",
+        ),
+        (
+            (angle, short, cover, angle, angle),
+            0.121,
+            "the grid has an angle, is short and leaves out 12.1% of the scan, and has 2 other faults;",
         ),
     ):
         found = replace(base, faults=faults, missing=missing)

@@ -14,7 +14,7 @@ from rough import rough_disc, rough_sphere, strip_of
 from small_grids import dome, fan, icosahedron, make_grid, two_pieces
 
 from scantruss import Grid, InputError
-from scantruss.report.figures import count_holes
+from scantruss.report.figures import count_holes, grid_lines
 
 CHECK = Path(__file__).resolve().parents[2] / "shared" / "check"
 
@@ -89,6 +89,15 @@ def test_topology_of_known_grids(
     assert (topology.components, topology.euler, topology.manifold) == (components, euler, manifold)
     if manifold:
         assert (topology.boundary_loops, topology.orientable) == (loops, orientable)
+
+
+def test_loops_as_long_as_the_longest_of_their_piece_are_not_said_to_be_holes() -> None:
+    """Of a hall on four feet three of its feet were said to be holes."""
+    tube, wide = strip_of(12), strip_of(12)
+    wide = wide.replace(nodes=wide.nodes * np.where(np.arange(len(wide.nodes)) < 12, 2.0, 1.0)[:, None])
+    assert grid_lines(tube, 100)[1] == "1 piece, 2 boundary loops"
+    assert grid_lines(wide, 100)[1] == "1 piece, 2 boundary loops, 1 of them a hole"
+    assert grid_lines(fan(), 100)[1] == "1 piece, 1 boundary loop, no hole"
 
 
 def test_every_loop_is_a_hole_but_the_outer_rim_of_its_piece() -> None:

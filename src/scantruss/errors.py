@@ -85,6 +85,11 @@ def words_of_number(value: float, digits: int) -> str:
     return f"{rounded:,.0f}" if rounded.is_integer() else f"{rounded:,}"
 
 
+def words_of_share(share: float) -> str:
+    """Return a share in percent with two digits; one that rounds to none is not said to be none."""
+    return "less than 0.01%" if 0.0 < share < 0.00005 else f"{share:.2%}"
+
+
 def words_of_count(count: int, name: str) -> str:
     """Return how many there are of something that is called `name`, or `name` with an s where they are not one."""
     return f"{count:,} {name}{'s' * (count != 1)}"

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..boundary.curves import length_along
-from ..errors import Place, words_of_count, words_of_number, words_of_place
+from ..errors import Place, words_of_count, words_of_number, words_of_place, words_of_share
 from ..grid.certificate import Certificate, Fault, place_of
 from ..grid.panels import inner_angles_of
 from ..settings import CheckSettings
@@ -142,7 +142,8 @@ def places_to_look_at(found: Certificate, missed_at: Place, rounded: float = 0.0
     warnings = [
         Fault(
             "far",
-            f"misses {words_of_count(part.points, 'point')} ({part.share:.2%}) by up to {words_of_number(part.farthest, 3)}{unit}",
+            f"misses {words_of_count(part.points, 'point')} ({words_of_share(part.share)})"
+            f" by up to {words_of_number(part.farthest, 3)}{unit}",
             part.where,
         )
         for part in found.left_out

@@ -35,9 +35,10 @@ def refusal_of(grid: Grid, complete: Callable[[], CertificateError] | None = Non
     """Return why a grid does not pass; `complete` makes the same with the whole certificate, where the grid has only its faults."""
     certificate = grid.certificate
     assert certificate is not None
-    words = _listed([fault.words for fault in certificate.faults[:FAULTS_NAMED]])
-    more = len(certificate.faults) - FAULTS_NAMED
-    words += f", and has {more} other {'fault' if more == 1 else 'faults'}" if more > 0 else ""
+    count = len(certificate.faults)
+    named = count if count <= FAULTS_NAMED + 1 else FAULTS_NAMED  # one more takes no more words than that there is one
+    words = _listed([fault.words for fault in certificate.faults[:named]])
+    words += f", and has {count - named} other faults" if count > named else ""
     where = next((fault.where for fault in certificate.faults if fault.where), None)
     return CertificateError(f"the grid {words}; {_way_out(certificate)}", grid, where, complete)
 

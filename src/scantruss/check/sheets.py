@@ -73,22 +73,24 @@ def faults_on_sheets(grid: Grid, samples: SurfaceSamples, nearest: np.ndarray, l
 
 
 def cut_apart(grid: Grid, samples: SurfaceSamples, found: Distances, length: float) -> list[Fault]:
-    """Return a warning where a limb that was cut off lies between pieces of the grid, which the scan has as one."""
+    """Return a warning where a limb that was cut off lies between pieces of the grid, one in the scan: where the smallest was joined."""
     node_piece = component_labels(len(grid.nodes), grid.edges[:, 0], grid.edges[:, 1])
     piece, cut = node_piece[grid.triangles[:, 0]], np.flatnonzero(samples.judged == LIMB)
     if not len(cut) or (piece == piece[0]).all():
         return []
     limb = points_together(samples.scan[cut], np.full(len(cut), LIMBS_APART * length))
-    near = found.scan[cut] < length
-    touched = np.unique(np.column_stack([limb[near], piece[found.triangle[cut[near]]]]), axis=0)
+    near = cut[found.scan[cut] < length]
+    limb, beside = limb[found.scan[cut] < length], piece[found.triangle[near]]
+    touched = np.unique(np.column_stack([limb, beside]), axis=0)
     _, number, pieces = np.unique(touched[:, 0], return_inverse=True, return_counts=True)
-    joined = np.unique(touched[pieces[number] > 1, 1])
+    joining, joined = (np.unique(each) for each in touched[pieces[number] > 1].T)
     if not len(joined):
         return []
     sizes = np.bincount(piece)
     smallest = joined[sizes[joined].argmin()]
+    ends = near[(beside == smallest) & np.isin(limb, joining)]
     words = f"is in {len(joined)} pieces: what joins them is too thin for the members and was cut off"
-    return [Fault("apart", words, place_of(grid.nodes[node_piece == smallest].mean(axis=0) + grid.origin))]
+    return [Fault("apart", words, place_of(samples.scan[ends[found.scan[ends].argmin()]] + grid.origin))]
 
 
 def broken_limb(

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from .options import Parser
 
 MOST_PIECES = 5  # pieces that are named one by one
-LONGEST_ADVISED = 2.0  # longest members that are advised where corners are doubtful [member lengths]
+SHORTEST_ADVISED, LONGEST_ADVISED = 1.1, 2.0  # members that are advised where corners are doubtful [member lengths]
 SCAN_HELP = "scan file, or a pattern in quotes such as 'tiles/*.laz': several files that are one scan"
 
 
@@ -171,7 +171,7 @@ def note_corners(bars: Bars, cloud: PointCloud, settings: Settings) -> None:
     if length > settings.length:
         where = words_of_place(cloud.origin + worst.points[worst.sparse_at])
         longer = f"longer members, from {round_length(length, 'up'):g}{unit}, show them better, and "
-        longer = longer if length <= LONGEST_ADVISED * settings.length else ""
+        longer = longer if SHORTEST_ADVISED <= length / settings.length <= LONGEST_ADVISED else ""
         bars.note(
             f"the points are random and sparse: near {where} they end on average about {words_of_number(worst.beyond, 2)}{unit}"
             f" before the boundary, so corners may be missed or false; {longer}--boundary gives them"

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .. import __version__
+from ..boundary.curves import length_around
 from ..check.limits import WARN_LEFT_OUT
-from ..errors import words_of_count, words_of_number, words_of_place
+from ..errors import words_of_count, words_of_number, words_of_place, words_of_share
 from ..grid.certificate import near
 from ..grid.line_sets import FIXED_LINE, RIDGE, sets_of
 from ..kernels.geometry.components import component_labels
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from ..surface.samples import SurfaceSamples
 
 
+AS_LONG = 2.0 / 3.0  # share of the longest boundary loop of a piece from which another is as likely its outer boundary
 MOST_LINES = 6  # lines of a kind that are named one by one
 OUTLIERS_WIDEN = 0.05  # share of the extent by which outliers make that of all points larger, from which both are given
 
@@ -109,11 +111,7 @@ def grid_lines(grid: Grid, points: int) -> list[str]:
     lines = [
         f"{len(grid.nodes)} nodes, {len(grid.edges)} members, {len(grid.panel_table)} {grid.panels_are} from {points:,} points",
         f"{topology.components} {'piece' if topology.components == 1 else 'pieces'}, "
-        + (
-            f"{loops} boundary {'loop' if loops == 1 else 'loops'}, {_holes_in_words(count_holes(grid))}"
-            if loops
-            else "closed"
-        ),
+        + (f"{loops} boundary {'loop' if loops == 1 else 'loops'}{_holes_in_words(grid)}" if loops else "closed"),
     ]
     lines += line_lines(grid)
     bridging = 0 if grid.deviation is None else len(grid.nodes) - len(grid.measured_deviation)
@@ -130,9 +128,16 @@ def grid_lines(grid: Grid, points: int) -> list[str]:
     return lines
 
 
-def _holes_in_words(count: int) -> str:
-    """Return how many boundary loops are holes."""
-    return "no hole" if count == 0 else f"{count} of them {'a hole' if count == 1 else 'holes'}"
+def _holes_in_words(grid: Grid) -> str:
+    """Return how many boundary loops are holes; nothing where two of a piece are about the longest, as of a body on four feet."""
+    label = component_labels(len(grid.nodes), grid.edges[:, 0], grid.edges[:, 1])
+    lengths: dict[int, list[float]] = {}
+    for loop in grid.boundary_loops:
+        lengths.setdefault(int(label[loop[0]]), []).append(length_around(grid.nodes[loop]))
+    if any(sorted(own)[-2] > AS_LONG * max(own) for own in lengths.values() if len(own) > 1):
+        return ""
+    count = count_holes(grid)
+    return ", no hole" if count == 0 else f", {count} of them {'a hole' if count == 1 else 'holes'}"
 
 
 def line_lines(grid: Grid) -> list[str]:
@@ -202,7 +207,7 @@ def _of_left_out(certificate: Certificate) -> str:
     if of_it is None or spread is None:
         return ""
     share = sum(part.points for part in certificate.left_out if part.farthest is not None) / certificate.points
-    return f"; {share:.2%} of them are listed as left out, the farthest among them: {of_it.words}{near(spread.largest.where)}"
+    return f"; {words_of_share(share)} of them are listed as left out, the farthest among them: {of_it.words}{near(spread.largest.where)}"
 
 
 def offset_words(certificate: Certificate) -> str:
@@ -227,7 +232,7 @@ def left_out_lines(certificate: Certificate) -> list[str]:
             some = f"{part.together:,} of them together" if part.together > 1 else "each alone, one"
             place = f", {some} near ({words_of_place(part.where)})" + f", {size}" * (part.together > 1)
         place = f", up to {words_of_number(part.size or 0.0, 3)}{unit} across" if part.number > 1 else place
-        count = f"{words_of_count(part.points, 'point')} ({part.share:.2%}) " if part.points else ""
+        count = f"{words_of_count(part.points, 'point')} ({words_of_share(part.share)}) " if part.points else ""
         asked = ", as asked for" if part.asked and part.kind != WITHOUT_COORDINATES else ""
         lines.append(f"left out: {count}{part.words}{place}{asked}" if count else f"{part.words}{place}")
     return lines

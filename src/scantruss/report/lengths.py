@@ -132,21 +132,31 @@ def accepted_line(trials: list[LengthTrial]) -> list[str]:
 
 
 def usual_cause(trials: list[LengthTrial]) -> str:
-    """Return why most lengths that were tried get no grid, as at one of them that gets none for this, and what to do."""
-    causes: dict[str, list[tuple[str, Place | None]]] = {}
-    for fault in (trial.fault for trial in trials if trial.fault is not None):
+    """Return why most lengths that were tried get no grid, as at one of them that gets none for this, and what to do.
+
+    Only the faults that the table names count.
+    """
+    causes: dict[str, list[tuple[float, str, Place | None]]] = {}
+    for tried, fault in ((trial.length, trial.fault) for trial in trials if trial.fault is not None):
         found = fault.grid.certificate if fault.grid is not None else None
         faults = {
-            each.kind: (f"the grid {each.words}", each.where) for each in (found.faults if found is not None else ())
+            each.kind: (tried, f"the grid {each.words}".partition(";")[0], each.where)
+            for each in (found.faults[:MOST_WORDS] if found is not None else ())
         }
-        for kind, cause in (faults or {str(fault): (str(fault), fault.where)}).items():
+        for kind, cause in (faults or {str(fault): (tried, str(fault).partition(";")[0], fault.where)}).items():
             causes.setdefault(kind, []).append(cause)
     if not causes:
         return "; clean or crop the scan first"
-    own = max(causes.values(), key=len)
-    words, where = own[len(own) // 2]
+    own = max(causes.values(), key=lambda each: (len(each), _are_alike(each)))
+    length, said, where = own[len(own) // 2]
     place = "" if where is None else f" (near {words_of_place(where)})"
-    return f", {len(own)} of {len(trials)} as {words.partition(';')[0]}{place}; clean or crop the scan there first"
+    why = f"as {said}" if _are_alike(own) else f"for faults of one kind, as at {length:g}: {said}"
+    return f", {len(own)} of {len(trials)} {why}{place}; clean or crop the scan there first"
+
+
+def _are_alike(causes: list[tuple[float, str, Place | None]]) -> bool:
+    """Whether the same is said of all lengths."""
+    return len({words for _, words, _ in causes}) == 1
 
 
 def passing_lines(trials: list[LengthTrial], unit: str) -> list[str]:
