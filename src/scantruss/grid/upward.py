@@ -75,7 +75,7 @@ def facing_up(grid: Grid, cloud: PointCloud) -> Grid:
     """Return a grid of which each open piece that faces down is turned over: a roof above a floor, a quarry whose centre lies above it.
 
     Up is what is known or likely; normals that came with the scan decide instead. It is turned over when it is made: which way its scan
-    faces has a say in its front.
+    faces has a say in its front. The mean bias of its nodes changes sign where all pieces are turned over, and is left where only some are.
     """
     if not len(grid.triangles) or cloud.normals is not None:
         return grid
