@@ -16,6 +16,7 @@ from scantruss.attempts.course import RIDGES_GIVEN_UP, WITHOUT_RODS, AttemptCour
 from scantruss.attempts.limit import MOST_RUNS
 from scantruss.attempts.table import AS_ASKED, ROWS_TRIED, TURNED_ROWS, Attempt, AttemptRow, attempts
 from scantruss.errors import FrontError
+from scantruss.grid.certificate import LeftOut
 from scantruss.surface import samples
 
 NAMES = [row.name for row in ROWS_TRIED]
@@ -158,9 +159,12 @@ def test_a_grid_along_rods_is_followed_by_one_attempt_without_and_the_better_is_
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr("scantruss.attempts.course.runs_along_rods", lambda *_: True)
-    monkeypatch.setattr("scantruss.attempts.course.lost_ridges", lambda *_: [])
+    monkeypatch.setattr("scantruss.attempts.course.lost_ridges", lambda *_: ([], []))
     cloud, asked = st.PointCloud.from_array(CLOUDS["cap"][0]), st.Settings(length=1.0)
-    grids = {count: cast(Any, SimpleNamespace(certificate=SimpleNamespace(warnings=(0,) * count))) for count in (1, 2)}
+    grids = {
+        count: cast(Any, SimpleNamespace(certificate=SimpleNamespace(warnings=(0,) * count, left_out=())))
+        for count in (1, 2)
+    }
     for first, without in ((1, 2), (2, 1)):
         course = AttemptCourse(cloud, asked)
         made = driven(course, {AS_ASKED: grids[first], WITHOUT_RODS: grids[without]})
@@ -169,6 +173,11 @@ def test_a_grid_along_rods_is_followed_by_one_attempt_without_and_the_better_is_
         assert course.outcome() is grids[1]
     course = AttemptCourse(cloud, asked)
     assert len(driven(course, {AS_ASKED: grids[2]})) == 2 and course.outcome() is grids[2]
+    gap = LeftOut("gap", 0, 0.0, (0.0, 0.0, 0.0), 1.0)
+    webbed = cast(Any, SimpleNamespace(certificate=SimpleNamespace(warnings=(0,), left_out=(gap,))))
+    course = AttemptCourse(cloud, asked)
+    driven(course, {AS_ASKED: webbed, WITHOUT_RODS: grids[2]})
+    assert course.outcome() is grids[2]  # more warnings, but no gap spanned
 
 
 def test_a_grid_that_breaks_a_limb_is_none_that_passes(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,7 +9,7 @@ from typed import known
 
 import scantruss as st
 from scantruss.check.certify import certify
-from scantruss.check.handles import cuts_of_members, false_struts, rings_around_handles
+from scantruss.check.handles import cuts_of_members, false_struts, has_sheets_within, rings_around_handles
 
 RADIUS, TUBE, HALF_GAP = 4.0, 1.2, 0.15
 
@@ -47,6 +47,17 @@ def test_a_grid_with_such_a_strut_fails(whole: st.Grid) -> None:
     samples, boundary = steps_of(st.PointCloud.from_array(two_balls()), settings)[:2]
     grid = whole.replace(origin=samples.origin, nodes=whole.nodes + whole.origin - samples.origin)
     assert "strut" in {fault.kind for fault in certify(grid, samples, boundary, settings).faults}
+
+
+@compiled_only
+def test_a_ring_around_a_wide_joint_has_a_sheet_on_either_side_within_and_one_around_a_limb_has_none() -> None:
+    """Two legs passed as joined at their feet, around which nothing faces the other side."""
+    turn = np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False)
+    circle = np.column_stack([np.cos(turn), np.zeros(8), np.sin(turn)])
+    joined, limb = samples_of(two_balls(), effort="quick"), samples_of(tire(RADIUS, TUBE, 0.1), effort="quick")
+    assert has_sheets_within([RADIUS, 0.0, 0.0] - joined.origin + 1.3 * circle, joined, 1.0)
+    assert not has_sheets_within([RADIUS, 2.0, 0.0] - joined.origin + 1.3 * circle, joined, 1.0)
+    assert not has_sheets_within([RADIUS, 0.0, 0.0] - limb.origin + TUBE * circle, limb, 1.0)
 
 
 def test_rings_around_a_handle_are_short_and_no_part_of_the_grid_lies_in_them(whole: st.Grid) -> None:

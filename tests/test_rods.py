@@ -81,6 +81,43 @@ def test_columns_are_rods_and_roof_and_floor_are_none(hall: tuple[np.ndarray, np
     assert rod[~column].mean() < 0.01
 
 
+def strut(rng: np.random.Generator, foot: tuple[float, ...], top: tuple[float, ...], points: int) -> np.ndarray:
+    along = rng.random(points)[:, None] * np.subtract(top, foot) + foot
+    turn = rng.uniform(0.0, 2.0 * np.pi, points)
+    round_it = np.column_stack([np.cos(turn), np.sin(turn), 0.0 * turn])
+    return np.asarray(along + 0.1 * round_it)
+
+
+@pytest.mark.parametrize("length", [0.8, 1.0, 1.2])
+def test_struts_between_two_walls_in_one_plane_are_no_patch_of_these(length: float) -> None:
+    """They are flat together, but not filled."""
+    rng = np.random.default_rng(2)
+    walls = np.column_stack([rng.uniform(0, 24, 12_000), rng.normal(0, 0.01, 12_000), rng.uniform(0, 5, 12_000)])
+    walls[6_000:, 2] += 9.0
+    legs = [strut(rng, (x, 0.0, 5.0), (x + step, 0.0, 9.0), 200) for x in range(3, 22, 4) for step in (-2.0, 2.0)]
+    rod = rods_of(np.concatenate([walls, *legs]), length)
+    assert rod[12_000:].mean() > 0.6 and not rod[:12_000].mean() > 0.01
+
+
+def shell_on_struts(rng: np.random.Generator) -> np.ndarray:
+    """A round wall over 16 pairs of struts, each a V upside down."""
+    turn, z = rng.uniform(0, 2 * np.pi, 14_000), rng.uniform(6.0, 20.0, 14_000)
+    girth = 24.0 - 0.2 * z
+    parts = [np.column_stack([girth * np.cos(turn), girth * np.sin(turn), z]) + rng.normal(0, 0.03, (14_000, 3))]
+    for k in np.arange(16):
+        for side in (-0.5, 0.5):
+            a, b = 2 * np.pi * k / 16, 2 * np.pi * (k + side) / 16
+            foot, top = (24 * np.cos(b), 24 * np.sin(b), 0.0), (22.8 * np.cos(a), 22.8 * np.sin(a), 6.0)
+            parts.append(strut(rng, foot, top, 260))
+    return np.concatenate(parts)
+
+
+def test_a_grid_that_spans_from_strut_to_strut_below_a_shell_is_followed_by_one_without_them() -> None:
+    length = 6.0
+    grid = st.grid_from_points(shell_on_struts(np.random.default_rng(3)), st.Settings(length=length, effort="quick"))
+    assert any(part.kind == "rods" for part in known(grid.certificate).left_out)
+
+
 @pytest.mark.parametrize("width", [0.8, 2.0])
 def test_a_sheet_is_no_rod_however_its_edge_runs(width: float) -> None:
     """Nor is a strip as wide as .8 members."""

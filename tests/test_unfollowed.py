@@ -10,6 +10,7 @@ from typed import known
 import scantruss as st
 from scantruss.boundary.find import find_boundary
 from scantruss.check.certify import certify
+from scantruss.check.unfollowed import is_wide
 from scantruss.grid.certificate import Fault
 from scantruss.pipeline import grid_from_points
 from scantruss.surface.samples import sample_surface
@@ -209,3 +210,12 @@ def test_a_grid_whose_nodes_jump_between_two_layers_is_refused(length: float, fa
             grid_from_points(points, st.Settings(length=length, effort="quick"))
     else:
         assert known(grid_from_points(points, st.Settings(length=length, effort="quick")).certificate).passed
+
+
+def test_a_strip_of_a_surface_and_a_line_of_points_are_parted_however_few_points_are_farthest_off() -> None:
+    """The edge of a niche that is cut off, and a cable beside the grid."""
+    along = np.linspace(0.0, 1.0, 30)
+    strip = np.column_stack([along, np.zeros(30), np.full(30, 0.33)])
+    beside = [strip + (0.0, 0.1 * side, -0.08) for side in (-1, 1)]
+    assert is_wide(strip, np.concatenate([strip, *beside]), 1.0, 0.03)
+    assert not is_wide(strip, np.concatenate([strip, beside[0][:9]]), 1.0, 0.03)

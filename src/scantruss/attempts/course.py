@@ -6,10 +6,18 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from ..check.limits import with_ridges_given_up, with_ridges_lost
+from ..check.limits import with_folds_cut, with_ridges_given_up, with_ridges_lost
 from ..errors import CertificateError, FrontError, OneSidedError, ScanTrussError
 from .limit import AttemptLimit, fails_by_front, joins_sheets, loses_limbs, only_leaves_out
-from .looks import breaks_limb, follows_more, jumps_between_walls, keeps_columns, runs_along_rods, stands_on_columns
+from .looks import (
+    breaks_limb,
+    follows_more,
+    jumps_between_walls,
+    keeps_columns,
+    runs_along_rods,
+    spans_fewer_gaps,
+    stands_on_columns,
+)
 from .lost_ridges import lost_ridges
 from .table import AS_ASKED, SECOND_LAYOUT, Attempt, attempts, layouts_of
 
@@ -34,7 +42,7 @@ class AttemptCourse:
 
     - `RIDGES_GIVEN_UP`: an attempt fails near ridges; each gives up one place more at least, of `FAULTS_WITHOUT_RIDGES`.
     - `WITHOUT_RODS`: a grid passes but runs along rods; once, as the last attempt. That with fewer warnings is taken, or that without
-      them where they are columns of a shell: a grid around some of them is no part of it.
+      them where it spans fewer gaps or they are columns of a shell: a grid around some of them is no part of it.
     - `BETWEEN_WALLS`: the first grid passes but may jump between the sides of thin walls; once, as the last attempt. That which follows
       more of the scan is taken.
     - least effort: none passes, and sheets are not too near each other; all attempts again, once: more effort never gives less. Those
@@ -120,8 +128,8 @@ class AttemptCourse:
                 self.failed(attempt, CertificateError(BREAKS_LIMB, grid, place))
             return
         given_up = attempt.ridges_given_up(self._cloud)
-        lost = lost_ridges(grid, self._cloud, self._settings, given_up)
-        grid = with_ridges_lost(with_ridges_given_up(grid, given_up), lost)
+        lost, rounded = lost_ridges(grid, self._cloud, self._settings, given_up)
+        grid = with_folds_cut(with_ridges_lost(with_ridges_given_up(grid, given_up), lost), rounded)
         if attempt.row == BETWEEN_WALLS:
             assert self._passed is not None
             self._passed = grid if follows_more(grid, self._passed) else self._passed
@@ -129,7 +137,8 @@ class AttemptCourse:
         if self._passed is not None:  # this one is without rods
             assert grid.certificate is not None and self._passed.certificate is not None
             fewer = len(grid.certificate.warnings) < len(self._passed.certificate.warnings)
-            self._passed = grid if fewer or self._around_columns else self._passed
+            better = fewer or spans_fewer_gaps(grid, self._passed)
+            self._passed = grid if better or self._around_columns else self._passed
             return
         self._around_columns = stands_on_columns(self._cloud, attempt.settings) and keeps_columns(
             self._cloud, attempt.settings

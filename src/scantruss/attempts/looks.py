@@ -27,7 +27,9 @@ if TYPE_CHECKING:
 # shares of thick samples from which on a scan is rough, and so rough that its mean surface comes first
 ROUGH_SCAN, VERY_ROUGH_SCAN = 0.02, 0.25
 MANY_OUTLIERS = 0.002  # share of the points that must be outliers for a grid to be tried without them
-SAID_BESIDE_RODS = ("aside", "far", "peak")  # kinds of warnings of a grid that runs along rods, or misses them
+# kinds of warnings of a grid that runs along rods, misses them or spans from one to another, and distance from a rod within which their
+# place is beside it [member lengths]: the middle of a gap between two rods is farther off
+SAID_BESIDE_RODS = {"aside": 0.5, "far": 0.5, "peak": 0.5, "gap": 1.0, "closed": 1.0}
 THIN_WALL, SOME_WALLS = 0.8, 0.05  # thickness of a thin wall [member lengths], and share of the places that have one
 ROUGH_AS_WALLS = 0.5  # share of its roughness that is left at most where the sides of walls are distinguished
 # kinds of warnings of a grid that jumps between walls
@@ -37,7 +39,6 @@ NOISE_AS_WALLS = 0.025  # noise from which on it looks like walls: at walls it i
 PLAINLY_NEARER = 0.75
 MISSING_ALIKE = 0.005  # share of the scan by which a grid may miss more than another and still follow it as far
 LEAST_IN_COLUMNS = 0.005  # least share of a scan in the columns that it stands on where z may not be up
-BESIDE_RODS = 0.5  # distance from a rod within which the place of a warning is beside it [member lengths]
 # by how much nearer a hundredth of the points must lie, in members, where members are unevener by 1 (std of their lengths / mean)
 NEARER_FOR_UNEVENER = 2.0
 # by how much the members of a grid that follows more ridges may be unevener, and how many times as far a hundredth of the points off it
@@ -146,7 +147,7 @@ def has_one_lattice(cloud: PointCloud, settings: Settings) -> bool:
 
 
 def runs_along_rods(grid: Grid, cloud: PointCloud, settings: Settings, asked: Settings) -> bool:
-    """Whether a grid that passes leaves the boundary of its scan beside rods, as where its edge runs down a column, or misses rods.
+    """Whether a grid that passes leaves the boundary of its scan beside rods, as where its edge runs down one, or misses or joins some.
 
     Where what was asked for cuts limbs off, rods are limbs too, and count as missing.
     """
@@ -154,7 +155,7 @@ def runs_along_rods(grid: Grid, cloud: PointCloud, settings: Settings, asked: Se
     if not settings.keep_rods or settings.method != "default" or found is None:
         return False
     places = [
-        place
+        (place, SAID_BESIDE_RODS[warning.kind] * settings.length)
         for warning in found.warnings
         if warning.kind in SAID_BESIDE_RODS
         for place in (warning.where, *warning.also)
@@ -165,8 +166,18 @@ def runs_along_rods(grid: Grid, cloud: PointCloud, settings: Settings, asked: Se
     samples = sample_surface(cloud, settings.replace(keep_rods=False))
     rods = samples.scan[samples.judged == ROD] + samples.origin
     return bool(len(rods)) and any(
-        bool((np.linalg.norm(rods - place, axis=1) < BESIDE_RODS * settings.length).any()) for place in places
+        bool((np.linalg.norm(rods - place, axis=1) < reach).any()) for place, reach in places
     )
+
+
+def spans_fewer_gaps(grid: Grid, other: Grid) -> bool:
+    """Whether a grid spans fewer gaps and openings than another one; both are certified."""
+    found, known = grid.certificate, other.certificate
+    return found is not None and known is not None and _gaps_spanned(found) < _gaps_spanned(known)
+
+
+def _gaps_spanned(found: Certificate) -> int:
+    return sum(part.number for part in found.left_out if part.kind in ("gap", "hole"))
 
 
 def jumps_between_walls(grid: Grid, cloud: PointCloud, asked: Settings) -> bool:

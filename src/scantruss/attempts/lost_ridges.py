@@ -33,6 +33,9 @@ COARSEST_FINER = 0.8  # ... and at most, in that of the grid
 OFF_AT_FOLD, APART_AT_FOLD, LONG_AT_FOLD = 0.05, 0.25, 0.7
 # mean distance of a member's length of a fold from the grid from which on it is cut off: where a ridge follows it it is 0.02 at most
 FOLD_OFF = 0.035  # [member lengths]
+# ... from which on it is cut off however unsure, and however short the others: its points alone show it
+DEEPLY_OFF = 0.25  # [member lengths]
+GAIN_OF_ROUNDED = 200.0  # median gain of a fold from which on it may be a rounded one: along groins 200 to 900
 # distance from a chain of the grid, or from a part of a ridge that is given up, within which a fold is that one [member lengths]
 SAME_FOLD = 0.2
 PLACES_ON_MEMBER = 6  # places on each member of a chain from which that is measured
@@ -42,11 +45,11 @@ SHORTEST_LOST, LEAST_LOST = 1.0, 2.0
 
 def lost_ridges(
     grid: Grid, cloud: PointCloud, asked: Settings, given_up: Sequence[np.ndarray] = ()
-) -> list[np.ndarray]:
-    """Return the parts of folds of a scan that a grid cuts across, the longest first, each (K, 3) [scan unit].
+) -> tuple[list[np.ndarray], list[np.ndarray]]:
+    """Return the parts of folds of a scan that a grid cuts across, and of rounded ones, the longest first, each (K, 3) [scan unit].
 
     They are looked for at half of the member length: folds too close together, or too short, to be ridges at the whole are seen there.
-    Wide folds that were made are looked for at the whole, too.
+    Wide folds are looked for at the whole, too. Those that were made, and what is cut off deeply, are lost; others are rounded.
 
     Parameters
     ----------
@@ -56,35 +59,47 @@ def lost_ridges(
     """
     made = grid.settings or asked
     if asked.ridge_angle <= 0.0 or asked.method != "default" or made.smooth_scale:
-        return []
+        return [], []
     length = float(made.length if grid.desired is None else grid.desired.min())
     finer = max(FINER * length, FEWEST_SPACINGS_OF_FINER * cloud.spacing)
     if finer > COARSEST_FINER * length or not _may_cut_folds(grid, cloud, made, length):
-        return []
+        return [], []
     known = np.concatenate([_places_on_chains(grid), *(part - cloud.origin for part in given_up)])
-    found: list[np.ndarray] = []
+    lost: list[np.ndarray] = []
+    rounded: list[np.ndarray] = []
+    is_deep = False
     for step in (finer, length):
         narrow, wide = _folds(
             cloud, made.replace(length=step, length_field="", ridge_angle=asked.ridge_angle, limb_girth=0.0)
         )
-        for places in narrow + wide if step == finer else wide:
-            cut = _is_cut(places, grid, length, np.concatenate([known, *found]), round(length / (FOLD_STRIDE * step)))
-            parts = [places[begin:end] for begin, end in runs(cut)]
-            found += [part for part in parts if length_along(part) >= SHORTEST_LOST * length]
-    found = [part + cloud.origin for part in found]
-    found.sort(key=length_along, reverse=True)
-    return found if sum(map(length_along, found)) >= LEAST_LOST * length else []
+        window = round(length / (FOLD_STRIDE * step))
+        sure = [bool(np.median(folds["gain"]) >= GAIN_OF_SURE) for folds in narrow]
+        clear = sure + list(map(is_made, wide))
+        for folds, is_clear in list(zip(narrow + wide, clear, strict=True))[0 if step == finer else len(narrow) :]:
+            places = folds["place"]
+            off = _distance_off(places, grid, length, window)
+            is_even = is_clear or bool(np.median(folds["gain"]) >= GAIN_OF_ROUNDED)
+            cut = off > (FOLD_OFF if is_even else DEEPLY_OFF) * length
+            cut &= _is_away(places, np.concatenate([known, *lost, *rounded]), length)
+            for begin, end in runs(cut):
+                part = places[begin:end]
+                if length_along(part) >= SHORTEST_LOST * length:
+                    is_deeply_cut = bool(np.median(off[begin:end]) > DEEPLY_OFF * length)
+                    is_deep |= is_deeply_cut
+                    (lost if is_clear or is_deeply_cut else rounded).append(part)
+    is_long = [sum(map(length_along, parts)) >= LEAST_LOST * length for parts in (lost, rounded)]
+    lost, rounded = (
+        sorted((part + cloud.origin for part in parts), key=length_along, reverse=True) for parts in (lost, rounded)
+    )
+    return lost if is_deep or is_long[0] else [], rounded if is_long[1] else []
 
 
 def _folds(cloud: PointCloud, settings: Settings) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """Return the places (K, 3) along each narrow fold of a scan that is sure, and along each wide one that was made."""
+    """Return the narrow folds of a scan and the wide ones, each (K,) FOLD."""
     try:
         samples = sample_surface(cloud, settings)
         found = None if samples.smooth else fold_lines(samples, settings)
-        if found is None:
-            return [], []
-        narrow = [folds["place"] for folds in found.narrow if np.median(folds["gain"]) >= GAIN_OF_SURE]
-        return narrow, [folds["place"] for folds in found.wide if is_made(folds)]
+        return ([], []) if found is None else (found.narrow, found.wide)
     except ScanTrussError:  # it carries no grid of such members, or its folds are a tangle
         return [], []
 
@@ -103,14 +118,20 @@ def _may_cut_folds(grid: Grid, cloud: PointCloud, made: Settings, length: float)
     return any(np.ptp(off[patch == number], axis=0).max() >= LONG_AT_FOLD * length for number in large)
 
 
-def _is_cut(places: np.ndarray, grid: Grid, length: float, known: np.ndarray, window: int) -> np.ndarray:
-    """Return which places along a fold (K, 3) lie off a grid in the mean of so many beside each other, away from places (M, 3)."""
+def _distance_off(places: np.ndarray, grid: Grid, length: float, window: int) -> np.ndarray:
+    """Return how far each place along a fold (K, 3) lies off a grid, in the mean of so many beside each other; 0 where it is missed."""
     away = distances_to_grid(np.ascontiguousarray(places), grid, length)[0]
     around = np.ones(min(window, len(places)))
     mean = np.convolve(away, around, "same") / np.convolve(np.ones(len(places)), around, "same")
-    cut: np.ndarray = (mean > FOLD_OFF * length) & (away < COVER_REACH * length)  # what is farther off is missed
+    off: np.ndarray = np.where(away < COVER_REACH * length, mean, 0.0)
+    return off
+
+
+def _is_away(places: np.ndarray, known: np.ndarray, length: float) -> np.ndarray:
+    """Return which places along a fold (K, 3) lie away from places (M, 3) of folds that are known."""
     gaps = np.linalg.norm(places[:, None] - known, axis=2).min(axis=1, initial=np.inf)
-    return cut & (gaps > SAME_FOLD * length)
+    away: np.ndarray = gaps > SAME_FOLD * length
+    return away
 
 
 def _places_on_chains(grid: Grid) -> np.ndarray:

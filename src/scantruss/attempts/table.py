@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from ..settings import Settings
     from ..surface.samples import SurfaceSamples
 
-AS_ASKED = "as asked"
+AS_ASKED, ROWS_TURNED, PLAIN_BODY = "as asked", "rows turned", "plain body"  # names of rows
 # lengths of the fronts without rows, in desired lengths, tried in turn where no other passes
 FRONT_LENGTHS = (1.0, 0.97, 1.04)
 TURNED_ROWS = (40.0, 10.0, 50.0)  # angles of the lattice that are tried instead of the usual one [degree]
@@ -190,10 +190,10 @@ ROWS_TRIED: tuple[AttemptRow, ...] = (
         {"thin_walls": True, "box_size": SAMPLE_SPACING},
     ),
     AttemptRow("front without rows", SECOND_LAYOUT),
-    AttemptRow("rows turned", TURNED_ROWS, lambda scan, now: has_one_lattice(scan.cloud, now)),
+    AttemptRow(ROWS_TURNED, TURNED_ROWS, lambda scan, now: has_one_lattice(scan.cloud, now)),
     # where edges, limbs or slits are in the way, other fronts seldom help
     AttemptRow("sharp edges", FIRST_LAYOUT, lambda scan, now: scan.has_sharp_edges, {"sharp_edges": True}),
-    AttemptRow("plain body", FIRST_LAYOUT, lambda scan, now: scan.has_plain_body, {"plain_body": True}),
+    AttemptRow(PLAIN_BODY, FIRST_LAYOUT, lambda scan, now: scan.has_plain_body, {"plain_body": True}),
     AttemptRow("fronts of other lengths", LATER_LAYOUTS),
     *(  # fewer limbs cut off, then none
         AttemptRow(f"limbs at {share:g} girth", FIRST_LAYOUT, lambda scan, now: scan.has_limbs_cut_off, shares={"limb_girth": share})
@@ -216,6 +216,17 @@ ROWS_TRIED: tuple[AttemptRow, ...] = (
     ),
     AttemptRow("the paper's method", ALL_LAYOUTS, lambda scan, now: scan.by_default and not now.rows_along, {"method": "paper"}),
 )  # fmt: skip
+
+
+def _moved(rows: tuple[AttemptRow, ...], name: str, behind: str) -> tuple[AttemptRow, ...]:
+    """Return the rows, one of them moved behind another."""
+    rest = [row for row in rows if row.name != name]
+    at = next(k for k, row in enumerate(rest) if row.name == behind) + 1
+    return (*rest[:at], *(row for row in rows if row.name == name), *rest[at:])
+
+
+#: the same for a few grids that show whether a length passes: of a body with thin limbs seldom one of turned rows does
+ROWS_OF_TRIALS = _moved(ROWS_TRIED, ROWS_TURNED, behind=PLAIN_BODY)
 
 
 def attempts(cloud: PointCloud, settings: Settings, rows: Sequence[AttemptRow] = ROWS_TRIED) -> Iterator[Attempt]:

@@ -9,6 +9,7 @@ from ..kernels.surface.local_surface import SURFACE_PATCH, Surface, fit_patch, o
 from ..runtime.blas import one_blas_thread
 from ..runtime.jit import new_record
 from ..surface.samples import SurfaceSamples
+from .polylines import well_within
 
 FILLING_SPACING = 0.1  # distance between the points generated over a hole [member lengths]
 PLACES_AROUND_HOLE = 60  # places along the boundary of a hole from which its surroundings are sampled
@@ -116,16 +117,7 @@ def _lattice(hole_boundary: np.ndarray, step: float) -> np.ndarray:
     rows, columns = np.arange(low[1], high[1], step * np.sqrt(0.75)), np.arange(low[0], high[0], step)
     x = columns + 0.5 * step * (np.arange(len(rows)) % 2)[:, None]
     places = np.column_stack([x.ravel(), np.repeat(rows, len(columns))])
-    start, end = hole_boundary, np.roll(hole_boundary, -1, axis=0)
-    kept = np.zeros(len(places), np.bool_)
-    for part in np.array_split(np.arange(len(places)), 1 + len(places) * len(hole_boundary) // 1_000_000):
-        p = places[part, None]
-        crosses = (start[:, 1] <= p[..., 1]) != (end[:, 1] <= p[..., 1])
-        rise = np.where(end[:, 1] == start[:, 1], 1.0, end[:, 1] - start[:, 1])
-        left = p[..., 0] < start[:, 0] + (p[..., 1] - start[:, 1]) / rise * (end[:, 0] - start[:, 0])
-        near = ((p - start) ** 2).sum(axis=2).min(axis=1) < (0.5 * step) ** 2
-        kept[part] = ((crosses & left).sum(axis=1) % 2 == 1) & ~near
-    return places[kept]
+    return places[well_within(places, hole_boundary, 0.5 * step)]
 
 
 def _thin_plate(flat: np.ndarray, values: np.ndarray, wanted: np.ndarray, smoothing: float) -> np.ndarray:

@@ -92,3 +92,17 @@ def feet_on_scan(points: np.ndarray, surface: Surface) -> tuple[np.ndarray, np.n
         beside = float(np.linalg.norm(surface.mean[sample] - points[k])) - 2.0 * surface.radius
         gaps[k] = max(float(np.linalg.norm(feet[k] - points[k])), beside)
     return feet, gaps
+
+
+def well_within(places: np.ndarray, polygon: np.ndarray, away: float) -> np.ndarray:
+    """Return which places (F, 2) lie inside a closed polyline (M, 2), and not within a distance of its points (F,) bool."""
+    start, end = polygon, np.roll(polygon, -1, axis=0)
+    kept = np.zeros(len(places), np.bool_)
+    for part in np.array_split(np.arange(len(places)), 1 + len(places) * len(polygon) // 1_000_000):
+        p = places[part, None]
+        crosses = (start[:, 1] <= p[..., 1]) != (end[:, 1] <= p[..., 1])
+        rise = np.where(end[:, 1] == start[:, 1], 1.0, end[:, 1] - start[:, 1])
+        left = p[..., 0] < start[:, 0] + (p[..., 1] - start[:, 1]) / rise * (end[:, 0] - start[:, 0])
+        near = ((p - start) ** 2).sum(axis=2).min(axis=1) < away**2
+        kept[part] = ((crosses & left).sum(axis=1) % 2 == 1) & ~near
+    return kept

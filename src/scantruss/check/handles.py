@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..boundary.polylines import well_within
 from ..errors import words_of_number
 from ..grid.certificate import Fault, place_of
 from .limits import PLACES_KEPT
@@ -20,6 +21,9 @@ BESIDE_RING = 0.5  # samples that lie so near to the members of a ring are of th
 # what a ring around a strut between two sheets has at least: how far they face each other, and the cosine of its axis and the way
 # from one to the other; around limbs and handles of the scan the first is negative, -0.7 to -1
 FACE_EACH_OTHER, ALONG_WAY = 0.4, 0.7
+# samples of a sheet on either side within a ring, near its plane and facing it, from which on it is around a joint of two sheets
+WITHIN_RING, FEWEST_OF_SHEET = 0.6, 3  # [member lengths]
+OFF_RING, FACES_RING = 0.3, 0.7  # distance from the ring from which on they are within it [member lengths], and cosine
 STRUTS_APART = 2.0  # rings whose middles are nearer to each other are around one strut [member lengths]
 
 
@@ -46,7 +50,9 @@ def false_struts(grid: Grid, samples: SurfaceSamples, found: Certificate, length
         )
         if not known and len(struts) < found.handles:
             facing, cosine = sheets_beside(grid.nodes[ring], samples, length)
-            if facing > FACE_EACH_OTHER and cosine > ALONG_WAY:
+            if (facing > FACE_EACH_OTHER and cosine > ALONG_WAY) or has_sheets_within(
+                grid.nodes[ring], samples, length
+            ):
                 struts.append(ring)
     if not struts:
         return []
@@ -81,6 +87,25 @@ def sheets_beside(ring: np.ndarray, samples: SurfaceSamples, length: float) -> t
     least = min(float(side.sum() / max(np.abs(side).sum(), 1e-300)) for side in sides)
     cosine = abs(float(axis @ across)) / max(float(np.linalg.norm(axis)), 1e-300)
     return least, cosine
+
+
+def has_sheets_within(ring: np.ndarray, samples: SurfaceSamples, length: float) -> bool:
+    """Whether the scan has a sheet on either side within a ring (K, 3) that faces the other: around a limb nothing of it lies there."""
+    middle = ring.mean(axis=0)
+    off = ring - middle
+    axis = np.cross(off, np.roll(off, -1, axis=0)).sum(axis=0)
+    axis /= max(float(np.linalg.norm(axis)), 1e-300)
+    away = samples.surface.mean - middle
+    height, facing = away @ axis, -samples.surface.normals @ axis * np.sign(away @ axis)
+    near = (np.abs(height) < WITHIN_RING * length) & (facing > FACES_RING)
+    near &= (away**2).sum(axis=1) < (np.linalg.norm(off, axis=1).max() + length) ** 2
+    if min((near & (height > 0.0)).sum(), (near & (height < 0.0)).sum()) < FEWEST_OF_SHEET:
+        return False
+    across = np.linalg.svd(axis[None])[2][1:]
+    edge = off @ across.T
+    edge = np.concatenate([edge, 0.5 * (edge + np.roll(edge, -1, axis=0))], axis=1).reshape(-1, 2)
+    sides = height[near][well_within(away[near] @ across.T, edge, OFF_RING * length)] > 0.0
+    return bool(min(sides.sum(), (~sides).sum()) >= FEWEST_OF_SHEET)
 
 
 def rings_around_handles(grid: Grid) -> list[np.ndarray]:

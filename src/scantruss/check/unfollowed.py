@@ -46,6 +46,9 @@ MOST_OFF_MEAN, OFF_MEAN = 0.15, 0.2
 # distance from the grid, beyond the noise, from which on points are of a peak that it cuts off [member lengths], and how many these
 # are at least, in all and times as many as points of a line as long
 HEIGHT_OF_PEAK, FEWEST_OF_PEAK, WIDTH_OF_PEAK = 0.3, 12, 3.0
+# the same distance of points around a peak, and how far from it and how many times as many these are: of the edges of a niche a strip no
+# wider than the spacing lies farthest off, and a surface beside it less far [member lengths]
+BASE_OF_PEAK, AROUND_PEAK, TIMES_AS_MANY = 0.15, 0.3, 2.0
 # distance of a crest from a grid from which on it is cut off, and share of its places that may be nearer [member lengths]
 CREST_OFF, SHARE_OF_CREST = 0.1, 0.6
 # longest way from the end of a ridge to a corner for which it makes [member lengths], least cosine of the angle between that way and its
@@ -143,7 +146,8 @@ def rounded_peaks(
         return []
     part = points_together(samples.scan[off], np.full(len(off), SPACINGS_OF_CUBE * samples.spacing))
     peaks = [off[part == number] for number in np.flatnonzero(np.bincount(part) >= FEWEST_OF_PEAK)]
-    peaks = [own for own in peaks if len(own) * samples.spacing >= WIDTH_OF_PEAK * _size(own, samples)]
+    base = samples.scan[chosen & (found.scan > BASE_OF_PEAK * members + NOISES_OFF * noise) & (found.scan <= members)]
+    peaks = [own for own in peaks if is_wide(samples.scan[own], base, float(members[own].mean()), samples.spacing)]
     if not peaks:
         return []
     peaks.sort(key=lambda own: -float(found.scan[own].max()))
@@ -152,6 +156,16 @@ def rounded_peaks(
     words = f"cuts off a peak, a tip or a dip by {words_of_number(found.scan[worst[0]], 3)}{unit}{more}; shorter members follow it"
     at, *others = (place_of(place) for place in samples.scan[worst] + samples.origin)
     return [Fault("peak", words, at, tuple(others))]
+
+
+def is_wide(peak: np.ndarray, base: np.ndarray, member: float, spacing: float) -> bool:
+    """Return whether the points (K, 3) of a peak, or those around it that lie off as well (M, 3), are a surface and no line of points."""
+    from scipy.spatial import cKDTree  # which most grids do not load
+
+    if len(peak) * spacing >= WIDTH_OF_PEAK * np.ptp(peak, axis=0).max():
+        return True
+    around = cKDTree(peak).query(base, distance_upper_bound=AROUND_PEAK * member)[0]
+    return bool(np.isfinite(around).sum() >= TIMES_AS_MANY * len(peak))
 
 
 def _off(

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..attempts.limit import MOST_RUNS, AttemptLimit, cuts_everywhere, loses_limbs
-from ..attempts.table import attempts
+from ..attempts.table import ROWS_OF_TRIALS, attempts
 from ..errors import FrontError, InputError, LengthError, LinesError, OneSidedError, ScanTrussError
 from ..pipeline import first_that_passes
 from ..scan.member_length import exact_range, length_range, round_length
@@ -88,7 +88,7 @@ class Advice:
             return known
         if length not in self._begun:
             settings = self._settings.replace(length=length)
-            trials = (replace(each, is_trial=True) for each in attempts(self._cloud, settings))
+            trials = (replace(each, is_trial=True) for each in attempts(self._cloud, settings, ROWS_OF_TRIALS))
             self._begun[length] = (settings, trials, AttemptLimit())
         settings, tried, limit = self._begun[length]
         before = limit.runs

@@ -155,7 +155,7 @@ def _arms(found: Linked, rod: np.ndarray, length: float) -> np.ndarray:
 
 
 def _patches(found: Linked, rod: np.ndarray, length: float) -> np.ndarray:
-    """Return which samples (S,) bool are of patches amid a sheet that nothing joins to it, as beyond a shadow: flat, in its plane."""
+    """Return which samples (S,) bool are of patches amid a sheet not joined to it, as beyond a shadow: flat, filled, in its plane."""
     patch = np.zeros(len(rod), np.bool_)
     if not rod.any():
         return patch
@@ -169,6 +169,10 @@ def _patches(found: Linked, rod: np.ndarray, length: float) -> np.ndarray:
         middle = points.mean(axis=0)
         variances, axes = np.linalg.eigh(np.cov(points - middle, rowvar=False))
         if variances[0] > FLAT_ACROSS * variances[1]:
+            continue
+        places = found.mean[own][:: -(-int(own.sum()) // JUNCTIONS_LOOKED_AT)]
+        filled = [_is_level(points, place, COARSE_REACH * length, axes[:, 0]) for place in places]
+        if 2 * sum(filled) <= len(filled):  # struts side by side
             continue
         low, high = points.min(axis=0) - END_REACH * length, points.max(axis=0) + END_REACH * length
         in_plane = ~rod & (np.abs((found.mean - middle) @ axes[:, 0]) < END_OFFSET * length)
