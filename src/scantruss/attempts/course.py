@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from ..check.limits import with_folds_cut, with_ridges_given_up, with_ridges_lost
+from ..check.limits import with_ridges_given_up, with_ridges_lost
 from ..errors import CertificateError, FrontError, OneSidedError, ScanTrussError
 from .limit import AttemptLimit, fails_by_front, joins_sheets, loses_limbs, only_leaves_out
 from .looks import (
@@ -128,8 +128,8 @@ class AttemptCourse:
                 self.failed(attempt, CertificateError(BREAKS_LIMB, grid, place))
             return
         given_up = attempt.ridges_given_up(self._cloud)
-        lost, rounded = lost_ridges(grid, self._cloud, self._settings, given_up)
-        grid = with_folds_cut(with_ridges_lost(with_ridges_given_up(grid, given_up), lost), rounded)
+        lost = lost_ridges(grid, self._cloud, self._settings, given_up)
+        grid = with_ridges_lost(with_ridges_given_up(grid, given_up), lost)
         if attempt.row == BETWEEN_WALLS:
             assert self._passed is not None
             self._passed = grid if follows_more(grid, self._passed) else self._passed

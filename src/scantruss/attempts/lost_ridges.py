@@ -35,21 +35,22 @@ OFF_AT_FOLD, APART_AT_FOLD, LONG_AT_FOLD = 0.05, 0.25, 0.7
 FOLD_OFF = 0.035  # [member lengths]
 # ... from which on it is cut off however unsure, and however short the others: its points alone show it
 DEEPLY_OFF = 0.25  # [member lengths]
-GAIN_OF_ROUNDED = 200.0  # median gain of a fold from which on it may be a rounded one: along groins 200 to 900
 # distance from a chain of the grid, or from a part of a ridge that is given up, within which a fold is that one [member lengths]
 SAME_FOLD = 0.2
 PLACES_ON_MEMBER = 6  # places on each member of a chain from which that is measured
 # shortest part of a fold that is lost, and least length of all together [member lengths]
 SHORTEST_LOST, LEAST_LOST = 1.0, 2.0
 
+ClearFold = tuple[np.ndarray, bool]  # (K,) FOLD, and whether it is clearly one
+
 
 def lost_ridges(
     grid: Grid, cloud: PointCloud, asked: Settings, given_up: Sequence[np.ndarray] = ()
-) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """Return the parts of folds of a scan that a grid cuts across, and of rounded ones, the longest first, each (K, 3) [scan unit].
+) -> list[np.ndarray]:
+    """Return the parts of folds of a scan that a grid cuts across, the longest first, each (K, 3) [scan unit].
 
     They are looked for at half of the member length: folds too close together, or too short, to be ridges at the whole are seen there.
-    Wide folds are looked for at the whole, too. Those that were made, and what is cut off deeply, are lost; others are rounded.
+    Wide folds are looked for at the whole, too. Those that are sure or were made are lost, and what is cut off deeply.
 
     Parameters
     ----------
@@ -59,49 +60,44 @@ def lost_ridges(
     """
     made = grid.settings or asked
     if asked.ridge_angle <= 0.0 or asked.method != "default" or made.smooth_scale:
-        return [], []
+        return []
     length = float(made.length if grid.desired is None else grid.desired.min())
     finer = max(FINER * length, FEWEST_SPACINGS_OF_FINER * cloud.spacing)
     if finer > COARSEST_FINER * length or not _may_cut_folds(grid, cloud, made, length):
-        return [], []
+        return []
     known = np.concatenate([_places_on_chains(grid), *(part - cloud.origin for part in given_up)])
-    lost: list[np.ndarray] = []
-    rounded: list[np.ndarray] = []
+    found: list[np.ndarray] = []
     is_deep = False
     for step in (finer, length):
         narrow, wide = _folds(
             cloud, made.replace(length=step, length_field="", ridge_angle=asked.ridge_angle, limb_girth=0.0)
         )
         window = round(length / (FOLD_STRIDE * step))
-        sure = [bool(np.median(folds["gain"]) >= GAIN_OF_SURE) for folds in narrow]
-        clear = sure + list(map(is_made, wide))
-        for folds, is_clear in list(zip(narrow + wide, clear, strict=True))[0 if step == finer else len(narrow) :]:
+        for folds, is_clear in narrow + wide if step == finer else wide:
             places = folds["place"]
             off = _distance_off(places, grid, length, window)
-            is_even = is_clear or bool(np.median(folds["gain"]) >= GAIN_OF_ROUNDED)
-            cut = off > (FOLD_OFF if is_even else DEEPLY_OFF) * length
-            cut &= _is_away(places, np.concatenate([known, *lost, *rounded]), length)
+            cut = (off > (FOLD_OFF if is_clear else DEEPLY_OFF) * length) & _is_away(
+                places, np.concatenate([known, *found]), length
+            )
             for begin, end in runs(cut):
-                part = places[begin:end]
-                if length_along(part) >= SHORTEST_LOST * length:
-                    is_deeply_cut = bool(np.median(off[begin:end]) > DEEPLY_OFF * length)
-                    is_deep |= is_deeply_cut
-                    (lost if is_clear or is_deeply_cut else rounded).append(part)
-    is_long = [sum(map(length_along, parts)) >= LEAST_LOST * length for parts in (lost, rounded)]
-    lost, rounded = (
-        sorted((part + cloud.origin for part in parts), key=length_along, reverse=True) for parts in (lost, rounded)
-    )
-    return lost if is_deep or is_long[0] else [], rounded if is_long[1] else []
+                if length_along(places[begin:end]) >= SHORTEST_LOST * length:
+                    found.append(places[begin:end])
+                    is_deep |= bool(np.median(off[begin:end]) > DEEPLY_OFF * length)
+    found = sorted((part + cloud.origin for part in found), key=length_along, reverse=True)
+    return found if is_deep or sum(map(length_along, found)) >= LEAST_LOST * length else []
 
 
-def _folds(cloud: PointCloud, settings: Settings) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """Return the narrow folds of a scan and the wide ones, each (K,) FOLD."""
+def _folds(cloud: PointCloud, settings: Settings) -> tuple[list[ClearFold], list[ClearFold]]:
+    """Return the narrow folds of a scan and the wide ones, each with whether it is clearly one: sure, or made."""
     try:
         samples = sample_surface(cloud, settings)
         found = None if samples.smooth else fold_lines(samples, settings)
-        return ([], []) if found is None else (found.narrow, found.wide)
     except ScanTrussError:  # it carries no grid of such members, or its folds are a tangle
+        found = None
+    if found is None:
         return [], []
+    narrow = [(folds, bool(np.median(folds["gain"]) >= GAIN_OF_SURE)) for folds in found.narrow]
+    return narrow, [(folds, is_made(folds)) for folds in found.wide]
 
 
 def _may_cut_folds(grid: Grid, cloud: PointCloud, made: Settings, length: float) -> bool:

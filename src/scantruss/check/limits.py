@@ -174,13 +174,6 @@ def with_ridges_lost(grid: Grid, parts: Sequence[np.ndarray]) -> Grid:
     return _with_ridges(grid, parts, "cuts across ridges of the scan", "lost", "; shorter members may follow them")
 
 
-def with_folds_cut(grid: Grid, parts: Sequence[np.ndarray]) -> Grid:
-    """Return a grid with a warning of the parts of rounded folds that it cuts across, as `with_ridges_given_up`."""
-    return _with_ridges(
-        grid, parts, "cuts across rounded folds of the scan", advice="; shorter members may follow them"
-    )
-
-
 def _with_ridges(grid: Grid, parts: Sequence[np.ndarray], said: str, kind: str = "ridge", advice: str = "") -> Grid:
     """Return a grid with a warning of parts of ridges: what is `said`, how long they are, and where the longest goes."""
     found = grid.certificate
