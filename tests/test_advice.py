@@ -510,6 +510,26 @@ def test_a_length_that_loses_ridges_gives_way_to_one_that_follows_them_below_len
     assert advice.suggest() == wanted
 
 
+@pytest.mark.parametrize(("idle", "steps"), [(0, 1), (1, 2), (2, 0)])
+def test_a_length_that_loses_ridges_gives_way_beyond_one_that_follows_no_more_at_most(
+    idle: int, steps: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A fluted valve was suggested members a third as long, seven times as many."""
+
+    def tried(advice: Advice, length: float, most: int = 0) -> LengthTrial:
+        down = round(math.log(advice._usual / length) / math.log(1.4))
+        warnings = (SimpleNamespace(kind="lost" if down <= idle else "peak"),)
+        found = SimpleNamespace(judged_out=0.0, left_out=(), warnings=warnings)
+        return LengthTrial(length, cast(Any, SimpleNamespace(certificate=found)))
+
+    monkeypatch.setattr(Advice, "try_length", tried)
+    advice = Advice(st.PointCloud.from_array(sheet(16, 16, 0.06)), st.Settings(length=1.0))
+    wanted = advice._usual
+    for _ in range(steps):
+        wanted = advice.next_below(wanted)
+    assert advice.suggest() == wanted
+
+
 @pytest.mark.parametrize("columns", [0.0, 0.12])
 def test_a_length_that_closes_openings_gives_way_beyond_one_that_follows_no_more(
     columns: float, monkeypatch: pytest.MonkeyPatch

@@ -210,7 +210,7 @@ class Advice:
         if not trial.follows_less:
             return trial.length
         self._count_at(trial.length, ladder.FIRST_TWO * ladder.STEPS_TO_FOLLOW)
-        above = trial
+        above, passed_over = trial, 0
         for _ in range(ladder.STEPS_TO_FOLLOW):
             below = self.next_below(above.length)
             shorter = self.try_length(below, ladder.FIRST_TWO) if below < above.length else None
@@ -218,6 +218,9 @@ class Advice:
                 break
             if shorter.passed and above.passed and shorter.follows_less < trial.follows_less:
                 return below
+            passed_over += shorter.passed
+            if passed_over > ladder.PASSED_OVER and trial.follows_less == 1:
+                break
             above = shorter
         return trial.length
 

@@ -31,6 +31,7 @@ NEARLY_NEXT = 1.45  # ratio of lengths that pass up to which the longer one stan
 LINES_OF_A_SCANNER = 5  # fewest lines of points that may be those of a scanner
 NEXT_LENGTH = 1.4  # a length is suggested if that many times it passes too
 STEPS_TO_FOLLOW = 4  # such steps that are gone down from one that closes openings or loses ridges to one that does not
+PASSED_OVER = 1  # most lengths between that pass and follow no more where it is only ridges or narrow parts
 SAME_LENGTH = 1.08  # ratio of lengths up to which what has come of one stands for the other
 # lengths that are tried in place of one that failed
 NEARBY_LENGTHS = (1.12, 0.9, 1.25, 0.8, 1.4, 0.7, 1.7, 0.6, 2.0, 0.5, 2.8)
