@@ -21,9 +21,8 @@ AGAINST_GRAVITY = np.array([0.0, 0.0, 1.0])
 OPEN_SHELL = 0.5  # length of the mean normal by area above which a shell is open: it faces one way on the whole
 # length of the mean normal by area above which a piece faces one way, as a wall with the pavement before it; less is a bowl or a hull
 FACES_ONE_WAY = 0.6
-FACES_DOWN = (
-    0.2  # downward part of that mean above which such a piece is turned over: a wall that leans faces as it does
-)
+# downward part of that mean above which such a piece is turned over: a wall that leans faces as it does
+FACES_DOWN = 0.2
 LEAST_FACING = 0.08  # length of the mean normal by area above which it decides which way is up if no flat face does
 # part of the direction that such a shell faces along an axis above which it is that axis
 ALONG_AXIS = math.cos(math.radians(25.0))
