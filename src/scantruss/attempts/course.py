@@ -12,10 +12,10 @@ from .limit import AttemptLimit, fails_by_front, joins_sheets, loses_limbs, only
 from .looks import (
     breaks_limb,
     follows_more,
+    gaps_spanned,
     jumps_between_walls,
     keeps_columns,
     runs_along_rods,
-    spans_fewer_gaps,
     stands_on_columns,
 )
 from .lost_ridges import lost_ridges
@@ -135,9 +135,9 @@ class AttemptCourse:
             self._passed = grid if follows_more(grid, self._passed) else self._passed
             return
         if self._passed is not None:  # this one is without rods
-            assert grid.certificate is not None and self._passed.certificate is not None
-            fewer = len(grid.certificate.warnings) < len(self._passed.certificate.warnings)
-            better = fewer or spans_fewer_gaps(grid, self._passed)
+            found, known = grid.certificate, self._passed.certificate
+            assert found is not None and known is not None
+            better = len(found.warnings) < len(known.warnings) or gaps_spanned(found) < gaps_spanned(known)
             self._passed = grid if better or self._around_columns else self._passed
             return
         self._around_columns = stands_on_columns(self._cloud, attempt.settings) and keeps_columns(

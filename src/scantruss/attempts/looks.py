@@ -170,13 +170,8 @@ def runs_along_rods(grid: Grid, cloud: PointCloud, settings: Settings, asked: Se
     )
 
 
-def spans_fewer_gaps(grid: Grid, other: Grid) -> bool:
-    """Whether a grid spans fewer gaps and openings than another one; both are certified."""
-    found, known = grid.certificate, other.certificate
-    return found is not None and known is not None and _gaps_spanned(found) < _gaps_spanned(known)
-
-
-def _gaps_spanned(found: Certificate) -> int:
+def gaps_spanned(found: Certificate) -> int:
+    """Return how many gaps and openings of its scan a grid spans."""
     return sum(part.number for part in found.left_out if part.kind in ("gap", "hole"))
 
 

@@ -69,43 +69,43 @@ def sheets_beside(ring: np.ndarray, samples: SurfaceSamples, length: float) -> t
     Of the direction in which most of its normals lie: how far what lies on either side of the ring in it faces the ring, the less
     of both, from -1 to 1; and the cosine between it and the axis of the ring.
     """
-    middle = ring.mean(axis=0)
-    off = ring - middle
-    axis = np.cross(off, np.roll(off, -1, axis=0)).sum(axis=0)
+    axis, near, away = _around(ring, samples, length)
     places = np.concatenate([ring, 0.5 * (ring + np.roll(ring, -1, axis=0))])
-    away = samples.surface.mean - middle
-    near = np.flatnonzero((away**2).sum(axis=1) < (np.linalg.norm(off, axis=1).max() + length) ** 2)
     gaps = ((samples.surface.mean[near, None] - places) ** 2).sum(axis=2).min(axis=1, initial=np.inf)
-    near = near[gaps < (BESIDE_RING * length) ** 2]
-    if not len(near):
+    beside = gaps < (BESIDE_RING * length) ** 2
+    if not beside.any():
         return 0.0, 0.0
-    normals = samples.surface.normals[near]
+    normals = samples.surface.normals[near[beside]]
     directions = np.linalg.eigh(normals.T @ normals)[1]
     across = directions[:, -1]
-    heights, facing = away[near] @ across, normals @ across
+    heights, facing = away[beside] @ across, normals @ across
     sides = [facing[heights < 0.0], -facing[heights > 0.0]]
     least = min(float(side.sum() / max(np.abs(side).sum(), 1e-300)) for side in sides)
-    cosine = abs(float(axis @ across)) / max(float(np.linalg.norm(axis)), 1e-300)
-    return least, cosine
+    return least, abs(float(axis @ across))
 
 
 def has_sheets_within(ring: np.ndarray, samples: SurfaceSamples, length: float) -> bool:
     """Whether the scan has a sheet on either side within a ring (K, 3) that faces the other: around a limb nothing of it lies there."""
+    axis, near, away = _around(ring, samples, length)
+    height = away @ axis
+    faces = -samples.surface.normals[near] @ axis * np.sign(height) > FACES_RING
+    faces &= np.abs(height) < WITHIN_RING * length
+    across = np.linalg.svd(axis[None])[2][1:]
+    edge = (ring - ring.mean(axis=0)) @ across.T
+    edge = np.concatenate([edge, 0.5 * (edge + np.roll(edge, -1, axis=0))], axis=1).reshape(-1, 2)
+    sides = height[faces][well_within(away[faces] @ across.T, edge, OFF_RING * length)] > 0.0
+    return bool(min(sides.sum(), (~sides).sum()) >= FEWEST_OF_SHEET)
+
+
+def _around(ring: np.ndarray, samples: SurfaceSamples, length: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the axis (3,) of a ring (K, 3), the samples (N,) around or within it, and their places from its middle (N, 3)."""
     middle = ring.mean(axis=0)
     off = ring - middle
     axis = np.cross(off, np.roll(off, -1, axis=0)).sum(axis=0)
     axis /= max(float(np.linalg.norm(axis)), 1e-300)
     away = samples.surface.mean - middle
-    height, facing = away @ axis, -samples.surface.normals @ axis * np.sign(away @ axis)
-    near = (np.abs(height) < WITHIN_RING * length) & (facing > FACES_RING)
-    near &= (away**2).sum(axis=1) < (np.linalg.norm(off, axis=1).max() + length) ** 2
-    if min((near & (height > 0.0)).sum(), (near & (height < 0.0)).sum()) < FEWEST_OF_SHEET:
-        return False
-    across = np.linalg.svd(axis[None])[2][1:]
-    edge = off @ across.T
-    edge = np.concatenate([edge, 0.5 * (edge + np.roll(edge, -1, axis=0))], axis=1).reshape(-1, 2)
-    sides = height[near][well_within(away[near] @ across.T, edge, OFF_RING * length)] > 0.0
-    return bool(min(sides.sum(), (~sides).sum()) >= FEWEST_OF_SHEET)
+    near = np.flatnonzero((away**2).sum(axis=1) < (np.linalg.norm(off, axis=1).max() + length) ** 2)
+    return axis, near, away[near]
 
 
 def rings_around_handles(grid: Grid) -> list[np.ndarray]:

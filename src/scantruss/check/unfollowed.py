@@ -160,10 +160,10 @@ def rounded_peaks(
 
 def is_wide(peak: np.ndarray, base: np.ndarray, member: float, spacing: float) -> bool:
     """Return whether the points (K, 3) of a peak, or those around it that lie off as well (M, 3), are a surface and no line of points."""
-    from scipy.spatial import cKDTree  # which most grids do not load
-
     if len(peak) * spacing >= WIDTH_OF_PEAK * np.ptp(peak, axis=0).max():
         return True
+    from scipy.spatial import cKDTree  # which most grids do not load
+
     around = cKDTree(peak).query(base, distance_upper_bound=AROUND_PEAK * member)[0]
     return bool(np.isfinite(around).sum() >= TIMES_AS_MANY * len(peak))
 
