@@ -97,6 +97,17 @@ def field(page: Any, name: str) -> Any:
     return page.locator(f"xpath=//label[normalize-space(.)='{name}']/following::input[1]").first
 
 
+def tick(page: Any, name: str, wanted: bool = True) -> None:
+    """Tick or untick a box; again, as a person would, where a press does nothing."""
+    box = field(page, name)
+    for _ in range(3):
+        if box.is_checked() != wanted:
+            box.click()
+        if until(lambda: bool(box.is_checked()) == wanted, 2.0):
+            return
+    raise AssertionError(f"'{name}' stays as it was")
+
+
 def choose(page: Any, old: str, new: str) -> None:
     """Choose something else in a drop-down list, as a person does."""
     page.locator(f"input[value='{old}']:visible").first.click()

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from browser import PATIENCE, open_page
 from PIL import Image
-from studio_person import choose, field, served_dome, tab, until
+from studio_person import choose, field, served_dome, tab, tick, until
 
 
 def drawn(page: Any) -> int:
@@ -42,14 +42,14 @@ def test_a_person_makes_quads_and_a_double_layer(tmp_path: Path) -> None:
     with served_dome(tmp_path) as (address, session, _), open_page(address) as (page, errors):
         page.wait_for_selector("text=Generate")
         tab(page, "Grid")
-        field(page, "draw panels").uncheck()
+        tick(page, "draw panels", False)
         page.wait_for_selector("text=undo: unit", state="attached")
         assert until(lambda: session.grid is not None) and session.worker.wait(PATIENCE)
         with_diagonals = at_rest(page)
         tab(page, "Design")
         choose(page, "triangle", "quad")
         page.wait_for_selector("text=/ quads .quick preview/")
-        field(page, "planar panels").check()
+        tick(page, "planar panels")
         page.click("button:has-text('Generate')")
         page.wait_for_selector("text=undo: generate")
         page.wait_for_selector("text=/, off plane 0[.]/")
@@ -57,7 +57,7 @@ def test_a_person_makes_quads_and_a_double_layer(tmp_path: Path) -> None:
         assert grid is not None and grid.cells == "quad" and grid.settings is not None and grid.settings.planar
         assert until(lambda: 0 < drawn(page) < 0.85 * with_diagonals)  # two of three rows of members are left
         tab(page, "Grid")
-        field(page, "draw panels").check()
+        tick(page, "draw panels")
         page.mouse.click(410, 370)
         page.wait_for_selector("text=/(node|member|panel) [NMP]\\d+/")
         tab(page, "Out")

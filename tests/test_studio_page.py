@@ -26,6 +26,7 @@ from studio_person import (
     free_port,
     served_dome,
     tab,
+    tick,
     until,
     until_drawn,
     write_dome,
@@ -495,7 +496,7 @@ def test_what_goes_is_shown_within_the_scan(served: tuple[str, Session, Any]) ->
         assert until(lambda: session.grid is not None) and session.worker.wait(PATIENCE)
         tab(page, "Grid")
         for name in ("draw members", "draw panels"):
-            field(page, name).uncheck()
+            tick(page, name, False)
 
         def drawn() -> int:
             return int((shown_colors(page) != 255).any(axis=1).sum())

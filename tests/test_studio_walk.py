@@ -11,7 +11,7 @@ from urllib.parse import urlsplit
 import numpy as np
 from browser import PATIENCE, open_page
 from PIL import Image
-from studio_person import SMALL, choose, click_corners, field, served_dome, tab, until, until_drawn
+from studio_person import SMALL, choose, click_corners, field, served_dome, tab, tick, until, until_drawn
 
 from scantruss.grid.marks import node_marks
 from scantruss.studio.browsers import Browsers
@@ -46,7 +46,7 @@ def test_what_is_refused_or_old_is_told_from_what_is(tmp_path: Path) -> None:
         assert "takes back" in undo.get_attribute("title") and "ends what runs" not in undo.get_attribute("title")
         tab(page, "Design")
         page.click("text=Holes and ridges")
-        field(page, "find and draw them").check()
+        tick(page, "find and draw them")
         page.wait_for_selector("text=none found")
         assert field(page, "click to").input_value() == "switch hole or ridge"
         tab(page, "Structure")
