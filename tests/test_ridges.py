@@ -48,6 +48,25 @@ def groin(count: int = 40_000, radius: float = 40.0, half: float = 28.0, noise: 
     return np.column_stack([xy, z]) + noise * rng.normal(size=(count, 3))
 
 
+def rounded_groin(
+    seed: int, width: float = 0.3, radius: float = 4.4, half: float = 4.0, count: int = 30_000
+) -> np.ndarray:
+    """Two barrel vaults that cross with rounded groins, evenly scanned with noise of a tenth of the spacing."""
+
+    def height(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        one, other = np.sqrt(radius**2 - x**2), np.sqrt(radius**2 - y**2)
+        share = np.clip(0.5 + 0.5 * (one - other) / width, 0.0, 1.0)
+        blended: np.ndarray = other + share * (one - other) + width * share * (1.0 - share)
+        return blended
+
+    rng, step = np.random.default_rng(seed), 1e-4
+    x, y = rng.uniform(-half, half, (2, 4 * count))
+    slope = np.hypot(height(x + step, y) - height(x - step, y), height(x, y + step) - height(x, y - step)) / (2 * step)
+    area = np.hypot(1.0, slope)
+    kept = np.flatnonzero(rng.uniform(size=len(x)) * area.max() < area)[:count]
+    return np.column_stack([x, y, height(x, y)])[kept] + rng.normal(0.0, 0.002, (len(kept), 3))
+
+
 def box(count: int = 40_000, half: float = 15.0, noise: float = 0.02) -> np.ndarray:
     """A cube: twelve ridges that meet by three."""
     rng = np.random.default_rng(4)
@@ -199,6 +218,26 @@ def test_what_is_short_blunt_or_uneven_is_no_ridge() -> None:
     assert not is_even(folds(angle=45.0, wiggle=0.006), asked)
     assert is_even(folds(angle=75.0, wiggle=0.006), asked)  # sharp ones need not be as even
     assert not is_even(folds(angle=75.0, wiggle=0.05), asked)
+
+
+@compiled_only
+@pytest.mark.parametrize("length", [0.65, 0.7])
+def test_all_groins_of_a_vault_are_ridges_where_most_are_even(length: float) -> None:
+    found = [len(ridges_of(rounded_groin(seed), length)) for seed in range(6)]
+    assert found.count(4) >= 5  # by their own evenness those of three and of two
+
+
+def test_a_few_even_folds_among_many_that_are_not_make_no_others_ridges() -> None:
+    tracer = Tracer.__new__(Tracer)
+    tracer.length, tracer.angle, tracer.sharpest, tracer.wide = 1.0, np.radians(40.0), 125.0, False
+    even, less, far = (folds(angle=60.0, wiggle=wiggle) for wiggle in (0.0, 0.006, 0.02))
+    less["place"] += 20.0
+    assert tracer._is_even(even) and not tracer._is_even(less) and tracer._is_even(less, 1.5)
+    assert not tracer._is_even(far, 1.5)
+    assert [id(each) for each in tracer._also_ridges([even, even], [less, far])] == [id(less)]
+    assert tracer._also_ridges([even, even], [less, far, far]) == []  # three of five are uneven
+    assert tracer._also_ridges([even], [less]) == []  # two say little
+    assert tracer._also_ridges([even, even], [even]) == []  # it is followed already
 
 
 def test_what_bends_evenly_is_even() -> None:

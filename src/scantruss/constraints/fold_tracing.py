@@ -19,6 +19,7 @@ from ..surface.near_scan import distance_from_scan, noise_of_points
 from .lines_of_folds import (
     FOLD_STRIDE,
     GAIN_OF_SURE,
+    NEARLY_EVEN,
     SHARPEST_EDGE,
     SHARPEST_FOLD_ANGLE,
     SHARPEST_LIP,
@@ -26,8 +27,10 @@ from .lines_of_folds import (
     WIDE_UNEVEN,
     is_clear_on_rough,
     is_even,
+    is_long,
     is_sure,
     parts_of_fold,
+    runs_along,
     smoothed,
     squares_between,
 )
@@ -61,6 +64,7 @@ MOST_SAMPLES = 4000  # most samples from which folds are looked for, the sharpes
 # places in a row that look folded and are no ridge, after which only long ridges count: at least, and for each ridge found before, as
 # a body with many edges has many corners
 FALSE_FOLDS_OF_ROUGH, FALSE_FOLDS_PER_RIDGE = 12, 2
+FEWEST_LONG_FOLDS = 3  # long lines of folds, at least, of which most are even where others are ridges too
 MOST_FALSE_FOLDS = 80  # such places in a row after which the search stops
 # places in a row at which a fold may not be seen and still goes on: beside a corner, a wide one is not for the width of its sides
 MISSED_PLACES, WIDE_MISSED_PLACES = 2, 4
@@ -162,7 +166,7 @@ class Tracer:
         """The lines of folds that are known, and those around samples (K,) that belong to none of them."""
         fresh = np.ones(len(seeds), bool)
         places = self.surface.mean[seeds]
-        ridges = list(known)
+        ridges, doubtful = list(known), list[np.ndarray]()
         misses, rough = 0, False
         for k, sample in enumerate(seeds.tolist()):
             if not fresh[k]:
@@ -178,22 +182,39 @@ class Tracer:
                 and np.linalg.norm(fold.place - places[k])
                 < (WIDE_FOLD_BESIDE if self.wide else FOLD_BESIDE) * self.length
             ):
-                folds, even = self._even_parts(sample, fold, [ridge["place"] for ridge in ridges], rough)
+                folds = self._follow(sample, fold, [ridge["place"] for ridge in ridges])
+                self.watch.note(len(folds), folds["place"][-1] + self.origin)
+                parts = parts_of_fold(folds)
+                even = [
+                    each for each in parts if self._is_even(each) and (not rough or is_clear_on_rough(each, self.angle))
+                ]
                 ridges += even
+                doubtful += [each for each in parts if not any(each is part for part in even)]
                 misses = 0 if even else misses
                 for place in folds["place"]:
                     fresh &= ((places - place) ** 2).sum(axis=1) > (2.4 * LOOK_SPACING * self.length) ** 2
-        return ridges
+        return ridges if self.wide else ridges + self._also_ridges(ridges, doubtful)
 
-    def _even_parts(
-        self, sample: int, fold: np.record, others: list[np.ndarray], rough: bool
-    ) -> tuple[np.ndarray, list[np.ndarray]]:
-        """The line of folds (K,) FOLD through a first one, and its parts that are even, on a rough scan those that are clear."""
-        folds, slack = self._follow(sample, fold, others), WIDE_UNEVEN if self.wide else 0.0
-        self.watch.note(len(folds), folds["place"][-1] + self.origin)
-        sharpest = SHARPEST_LIP if self.wide else self.sharpest
-        even = [each for each in parts_of_fold(folds) if is_even(each, WEAK_FOLD * self.angle, sharpest, slack)]
-        return folds, [part for part in even if not rough or is_clear_on_rough(part, self.angle)]
+    def _is_even(self, folds: np.ndarray, times: float = 1.0) -> bool:
+        """Whether a line of folds (K,) FOLD is as even as a ridge, or so many times less."""
+        sharpest, slack = (SHARPEST_LIP, WIDE_UNEVEN) if self.wide else (self.sharpest, 0.0)
+        return is_even(folds, WEAK_FOLD * self.angle, sharpest, slack, times)
+
+    def _also_ridges(self, ridges: list[np.ndarray], doubtful: list[np.ndarray]) -> list[np.ndarray]:
+        """Doubtful lines of folds (K,) FOLD that are ridges too, where most long ones are even: even on a rough scan, or less even."""
+        even = [folds for folds in ridges + doubtful if is_long(folds, self.angle) and self._is_even(folds)]
+        others = [folds for folds in doubtful if is_long(folds, self.angle) and not self._is_even(folds)]
+        if len(even) + len(others) < FEWEST_LONG_FOLDS or len(even) < len(others):
+            return []
+        also: list[np.ndarray] = []
+        for folds in doubtful:
+            if (
+                is_long(folds, self.angle)
+                and self._is_even(folds, NEARLY_EVEN)
+                and not runs_along(folds, [*ridges, *also], FOLDS_MEET_WITHIN * self.length)
+            ):
+                also.append(folds)
+        return also
 
     def is_folded_between(self, first: np.ndarray, last: np.ndarray) -> bool:
         """Whether the scan is folded all along the straight way from one place to another."""

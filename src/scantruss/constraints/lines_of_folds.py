@@ -29,6 +29,7 @@ SHARPEST_EDGE = 155.0  # most that a surface bends at a fold where sharp edges o
 EVEN_FOLDS = (0.5, 3.5)
 BLUNT_FOLD, ACUTE_FOLD = 50.0, 70.0  # angles of folds between which the allowed change of the bend grows [degree]
 BY_NOISE = 0.2  # change of the bend that noise explains, for the root of the gain 1 [radian]
+NEARLY_EVEN = 1.5  # times that change up to which a long line of folds may be a ridge beside others that are even
 WIDE_UNEVEN = 2.0  # further change of the bend that is allowed of wide folds, whose places are less certain [degree]
 SURE_GAIN = 25.0  # median gain, at least (F statistic)
 
@@ -105,8 +106,19 @@ def is_clear_on_rough(folds: np.ndarray, angle: float) -> bool:
     return long >= LEAST_SURE_ROUGH and is_sure(folds, angle)
 
 
-def is_even(folds: np.ndarray, angle: float, sharpest: float = SHARPEST_FOLD_ANGLE, slack: float = 0.0) -> bool:
-    """Whether a line of folds (K,) FOLD, a stride apart, has an angle and is as even as a ridge: what bends evenly is."""
+def is_long(folds: np.ndarray, angle: float) -> bool:
+    """Whether a sure line of folds (K,) FOLD has the full angle along so much of it that it says what kind of scan this is."""
+    full = folds["bend"] >= NEARLY_FULL_ANGLE * angle
+    return is_sure(folds, angle) and float(full.sum()) * FOLD_STRIDE >= LONG_FULL
+
+
+def is_even(
+    folds: np.ndarray, angle: float, sharpest: float = SHARPEST_FOLD_ANGLE, slack: float = 0.0, times: float = 1.0
+) -> bool:
+    """Whether a line of folds (K,) FOLD, a stride apart, has an angle and is as even as a ridge, or so many times less.
+
+    What bends evenly is.
+    """
     angles = folds["bend"]
     if len(folds) * FOLD_STRIDE < SHORTEST_LINE_OF_FOLDS or (angles >= angle).sum() * FOLD_STRIDE < LEAST_FULL_LENGTH:
         return False
@@ -118,7 +130,7 @@ def is_even(folds: np.ndarray, angle: float, sharpest: float = SHARPEST_FOLD_ANG
     most = np.radians(np.interp(bend, (BLUNT_FOLD, ACUTE_FOLD), EVEN_FOLDS) + slack) + BY_NOISE / np.sqrt(
         max(gain, 1.0)
     )
-    return bool(gain >= SURE_GAIN and uneven <= most and bend < sharpest)
+    return bool(gain >= SURE_GAIN and uneven <= times * most and bend < sharpest)
 
 
 def smoothed(places: np.ndarray) -> np.ndarray:
