@@ -92,6 +92,14 @@ def test_normals_of_either_sign_are_not_trusted() -> None:
     assert GivenNormals.of(points, sign * outward(points)) is None
 
 
+def test_a_few_normals_that_face_the_wrong_way_are_turned_and_walls_stay_apart() -> None:
+    points = np.asarray(blocks().vertices)
+    wrong = np.random.default_rng(3).random(len(points)) < 0.02
+    found = GivenNormals.of(points, np.where(wrong[:, None], -1.0, 1.0) * outward(points))
+    assert found is not None and 50 < wrong.sum() < 200
+    assert ((found.normals * outward(points)).sum(axis=1) > 0.0).mean() > 0.999
+
+
 def test_columns_of_normals_are_read_and_follow_the_points(tmp_path: Path) -> None:
     """Those of points that are left out leave with them."""
     points = np.random.default_rng(1).random((500, 3))

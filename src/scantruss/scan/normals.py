@@ -125,8 +125,10 @@ def _at_edge(mean: np.ndarray, normals: np.ndarray, neighbors: np.ndarray, own: 
     return own[np.linalg.norm(way, axis=1) > EDGE_ON_ONE_SIDE * np.maximum(known[:, :, 0].sum(axis=1), 1)]
 
 
-def check_two_sided(surface: Surface, thickness: np.ndarray) -> None:
+def check_two_sided(surface: Surface, thickness: np.ndarray, *, with_normals: bool = False) -> None:
     """Refuse a one-sided surface (Moebius strip): however its normals are oriented, opposite ones meet somewhere.
+
+    So may those that came with a scan, if they face both ways.
 
     Only links within smooth parts count, between neighbours that lie side by side and yet face opposite sides: on rough or
     overgrown scans that happens at random.
@@ -139,4 +141,5 @@ def check_two_sided(surface: Surface, thickness: np.ndarray) -> None:
     if kernels.head_on_links(surface.mean, surface.normals, surface.neighbors, thickness, smooth) >= HEAD_ON:
         raise OneSidedError(
             "the scanned surface is one-sided (like a Moebius strip); a grid needs two sides; cut the scan into pieces"
+            + (", or leave out its normals if they are wrong" if with_normals else "")
         )

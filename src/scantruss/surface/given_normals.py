@@ -13,9 +13,12 @@ from ..scan.clean.nearby import SEARCHES_PER_THREAD, build_kd_tree
 from ..scan.cloud import PointCloud
 
 NO_NORMALS = np.empty((0, 3))  # where none are given
-POINTS_TO_JUDGE = 2000  # points by which it is judged whether normals can be trusted
+POINTS_TO_JUDGE = 20_000  # points by which it is judged whether normals can be trusted
 BESIDE_SINE = 0.3  # sine of the angle to its plane below which the nearest point lies beside a point, not behind it
 MOST_OPPOSITE = 0.1  # share of them that may face opposite to one beside them; of normals of either sign half do
+# nearest points that decide whether a normal is turned, how many of them must face opposite to it, and how many lie beside its point at
+# least: the other side of a thin wall lies behind it; rounds, as those that are turned decide on others
+NEAREST, MOST_OF_NEAREST, FEWEST_BESIDE, ROUNDS = 12, 10, 3, 8
 AT_A_POINT = 1e-6  # distance from a point within which a place has its normal [extent of the scan]
 
 _NORMALS_OF_CLOUDS: weakref.WeakKeyDictionary[PointCloud, GivenNormals | None] = weakref.WeakKeyDictionary()
@@ -31,17 +34,35 @@ class GivenNormals:
 
     @classmethod
     def of(cls, points: np.ndarray, normals: np.ndarray) -> GivenNormals | None:
-        """Return the normals (N, 3) of points (N, 3), None where they face both ways, as those of a plane fit may do."""
+        """Return the normals (N, 3) of points (N, 3), None where they face both ways, as those of a plane fit may do.
+
+        A few that face opposite to the points around them are turned.
+        """
         lengths = np.linalg.norm(normals, axis=1, keepdims=True)
         known = (lengths[:, 0] > 0.0) & np.isfinite(lengths[:, 0])
         unit = np.where(known[:, None], normals / np.where(known[:, None], lengths, 1.0), 0.0)
         given = cls(build_kd_tree(points), unit, AT_A_POINT * float(np.ptp(points, axis=0).max()))
         some = np.linspace(0, len(points) - 1, min(len(points), POINTS_TO_JUDGE)).astype(np.int64)
-        other, _ = given._nearest(points[some], 2)
-        apart = points[other] - points[some]
-        beside = np.abs((apart * unit[some]).sum(axis=1)) < BESIDE_SINE * np.linalg.norm(apart, axis=1)
-        opposite = (unit[some] * unit[other]).sum(axis=1) < 0.0
-        return given if (opposite & beside).mean() <= MOST_OPPOSITE else None
+        other = given._nearest(points[some], 2)[0]
+        opposite = ((unit[some] * unit[other]).sum(axis=1) < 0.0) & _is_beside(points, unit, some, other)
+        if opposite.mean() > MOST_OPPOSITE:
+            return None
+        if opposite.any():
+            given._turn_to_others(points)
+        return given
+
+    def _turn_to_others(self, points: np.ndarray) -> None:
+        """Turn those normals of points (N, 3) that face opposite to nearly all around them."""
+        unit, next_one = self.normals, self._nearest(points, 2)[0]
+        for _ in range(ROUNDS):
+            doubtful = np.flatnonzero((unit * unit[next_one]).sum(axis=1) < 0.0)
+            others = np.stack([self._nearest(points[doubtful], rank)[0] for rank in range(2, NEAREST + 2)])
+            opposite = ((unit[doubtful] * unit[others]).sum(axis=2) < 0.0).sum(axis=0)
+            beside = sum(_is_beside(points, unit, doubtful, other).astype(int) for other in others)
+            turned = doubtful[(opposite >= MOST_OF_NEAREST) & (beside >= FEWEST_BESIDE)]
+            if not len(turned):
+                break
+            unit[turned] *= -1.0
 
     def at(self, places: np.ndarray) -> np.ndarray:
         """Return the normals at places (P, 3), those of the points there; zero where there is none, (P, 3)."""
@@ -57,6 +78,13 @@ class GivenNormals:
 
         in_parts(len(places), SEARCHES_PER_THREAD, look_up)
         return which, squares
+
+
+def _is_beside(points: np.ndarray, unit: np.ndarray, which: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Return whether other points (K,) lie beside some points (K,) in the plane of their normals, not behind them."""
+    apart = points[other] - points[which]
+    beside: np.ndarray = np.abs((apart * unit[which]).sum(axis=1)) < BESIDE_SINE * np.linalg.norm(apart, axis=1)
+    return beside
 
 
 def given_normals(cloud: PointCloud) -> GivenNormals | None:
