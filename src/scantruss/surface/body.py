@@ -93,7 +93,7 @@ def opened_body(
     """
     if given is not None:
         return _opened(points, length, spacing, given)
-    asked = (sha256(np.ascontiguousarray(points)).digest(), length, spacing)
+    asked = (sha256(points.tobytes()).digest(), length, spacing)
     opened = _OPENED.pop(asked) if asked in _OPENED else _opened(points, length, spacing, None)
     _OPENED[asked] = opened
     for oldest in list(_OPENED)[:-BODIES_KEPT]:
