@@ -578,6 +578,15 @@ def test_a_length_out_of_range_is_refused_with_the_nearest_that_passes(
         assert main(["grid", "limpet.xyz", "a.json", "--effort", "quick", "--length", str(named)]) == 0
 
 
+def test_why_a_length_is_out_of_range_is_said_before_others_are_tried(
+    place: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before: list[str] = []
+    monkeypatch.setattr(Advice, "nearby", lambda *_: before.append(capsys.readouterr().err))
+    assert main(["grid", "limpet.xyz", "a.json", "--length", "0.01"]) == 2
+    assert "length 0.01 is too small for points that are" in before[0] and "use at least" in before[0]
+
+
 def test_where_no_length_passes_those_tried_are_named_and_not_tried_again(
     place: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

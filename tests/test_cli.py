@@ -419,8 +419,9 @@ def test_grid_writes_all_it_was_asked_for_and_its_settings(place: Path, capsys: 
 
 @pytest.fixture
 def failing(place: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """No grid can pass."""
+    """No grid can pass, and not many are made."""
     monkeypatch.setattr("scantruss.check.defects.UNEVEN_LENGTHS", 0.0)
+    monkeypatch.setattr("scantruss.attempts.limit.MOST_RUNS", 2)
     return place
 
 

@@ -55,6 +55,16 @@ def samples_of(points: np.ndarray, **settings: float) -> SurfaceSamples:
     return sample_surface(st.PointCloud.from_array(points), st.Settings(length=1.0, **settings))  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize(("tip", "is_cut"), [(4.0, False), (1.2, True)])
+def test_samples_that_were_not_cut_are_those_without_cutting(tip: float, is_cut: bool) -> None:
+    """They are not made again, and so not the lines of folds either."""
+    cloud, settings = st.PointCloud.from_array(body(5.0, tip)), st.Settings(length=1.0)
+    first, without = sample_surface(cloud, settings), sample_surface(cloud, settings.replace(limb_girth=0.0))
+    anew = samples_of(body(5.0, tip), limb_girth=0.0)
+    assert bool(first.rings) == is_cut and (without is first) != is_cut
+    assert np.array_equal(without.surface.mean, anew.surface.mean) and np.array_equal(without.judged, anew.judged)
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_a_tapering_limb_is_cut_where_it_is_three_members_round(seed: int) -> None:
     points = body(5.0, 1.2, seed=seed)

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 import scantruss as st
-from scantruss.surface.body import LIMB_RADIUS, SLIT_RADIUS, _distance, _Lattice, opened_body
+from scantruss.surface import body
+from scantruss.surface.body import BODIES_KEPT, LIMB_RADIUS, SLIT_RADIUS, _distance, _Lattice, opened_body
 from scantruss.surface.samples import sample_surface
 
 LENGTH, RADIUS, SPACING = 1.0, 4.0, 0.1
@@ -95,6 +96,21 @@ def test_a_ball_a_dome_and_a_sheet_stay_as_they_are() -> None:
     half = ball()[ball()[:, 2] > 0.0]
     for scan in (ball(), half, np.column_stack([plan, 0.1 * plan[:, 0] ** 2])):
         assert opened_body(scan, LENGTH, SPACING) is None
+
+
+def test_a_body_is_opened_once_for_the_same_points_and_length(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Looks at a scan by other settings ask for it again; of all that were opened the last are kept."""
+    made: list[tuple[int, float]] = []
+    monkeypatch.setattr(body, "_opened", lambda points, length, *_: made.append((len(points), length)))
+    monkeypatch.setattr(body, "_OPENED", {})
+    scan = ball(500)
+    for points, length in ((scan, 1.0), (scan.copy(), 1.0), (scan[1:], 1.0), (scan, 2.0), (scan, 1.0)):
+        opened_body(points, length, SPACING)
+    assert made == [(500, 1.0), (499, 1.0), (500, 2.0)]
+    for step in range(BODIES_KEPT):
+        opened_body(scan, 3.0 + step, SPACING)
+    opened_body(scan, 1.0, SPACING)
+    assert made[-1] == (500, 1.0) and len(body._OPENED) == BODIES_KEPT
 
 
 def test_an_open_body_is_closed_at_its_boundary_first() -> None:

@@ -70,10 +70,15 @@ def test_a_box_has_all_of_its_wide_edges_or_none(cloud: PointCloud) -> None:
     assert wide_folds(samples, settings.replace(ridge_angle=0.0)) == []
 
 
+@pytest.fixture(scope="module")
+def made(cloud: PointCloud) -> Grid:
+    return grid_from_points(cloud, Settings(length=SIZE))
+
+
 @compiled_only
-def test_a_grid_with_wide_ridges_is_nearer_to_the_scan(cloud: PointCloud) -> None:
+def test_a_grid_with_wide_ridges_is_nearer_to_the_scan(cloud: PointCloud, made: Grid) -> None:
     settings = Settings(length=SIZE)
-    plain, made = make_grid(cloud, Attempt(settings)), grid_from_points(cloud, settings)
+    plain = make_grid(cloud, Attempt(settings))
     assert made.certificate is not None and made.certificate.passed
     assert len(made.lines) > len(plain.lines) and follows_better(made, plain)
     assert not follows_better(plain, made)
@@ -83,9 +88,9 @@ def test_a_grid_with_wide_ridges_is_nearer_to_the_scan(cloud: PointCloud) -> Non
 
 
 @compiled_only
-def test_more_effort_does_not_leave_the_wide_ridges(cloud: PointCloud) -> None:
-    normal, best = (grid_from_points(cloud, Settings(length=SIZE, effort=effort)) for effort in ("normal", "best"))
-    assert len(normal.lines) > 60 and len(best.lines) > 60  # twelve edges of seven members and more
+def test_more_effort_does_not_leave_the_wide_ridges(cloud: PointCloud, made: Grid) -> None:
+    best = grid_from_points(cloud, Settings(length=SIZE, effort="best"))
+    assert len(made.lines) > 60 and len(best.lines) > 60  # twelve edges of seven members and more
 
 
 def _with(grid: Grid, p99: float, kinds: tuple[str, ...] = ()) -> Grid:

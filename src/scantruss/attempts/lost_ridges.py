@@ -68,10 +68,11 @@ def lost_ridges(
     known = np.concatenate([_places_on_chains(grid), *(part - cloud.origin for part in given_up)])
     found: list[np.ndarray] = []
     is_deep = False
+    looked = made.replace(length_field="", ridge_angle=asked.ridge_angle, limb_girth=0.0)
+    # first at the length of the grid, whose samples are still kept
+    folds_at = {step: _folds(cloud, looked.replace(length=step)) for step in (length, finer)}
     for step in (finer, length):
-        narrow, wide = _folds(
-            cloud, made.replace(length=step, length_field="", ridge_angle=asked.ridge_angle, limb_girth=0.0)
-        )
+        narrow, wide = folds_at[step]
         window = round(length / (FOLD_STRIDE * step))
         for folds, is_clear in narrow + wide if step == finer else wide:
             places = folds["place"]

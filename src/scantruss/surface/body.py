@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from hashlib import sha256
 from itertools import chain, pairwise
 from typing import NamedTuple
 
@@ -46,6 +47,7 @@ NEAR_GAP = 0.7  # distance of samples of one boundary [member lengths]
 MOST_OPEN = 0.12  # area within the boundaries of a scan that still encloses a body [area of the scan]
 FEWEST_OF_BOUNDARY = 8  # samples of a boundary that is walled off
 MOST_TAKEN_OFF = 0.4  # share of the points that may be taken off; of more, the scan encloses no body
+BODIES_KEPT = 4  # bodies opened last that are kept, as several looks at a scan ask for the same; two bytes a point
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +72,11 @@ class _Lattice(NamedTuple):
         return voxels
 
 
+_OPENED: dict[
+    tuple[bytes, float, float], OpenedBody | None
+] = {}  # by the digest of the points, the one asked for last is the last
+
+
 def opened_body(
     points: np.ndarray, length: float, spacing: float, given: GivenNormals | None = None
 ) -> OpenedBody | None:
@@ -84,6 +91,18 @@ def opened_body(
     given : GivenNormals, optional
         Normals that came with the scan.
     """
+    if given is not None:
+        return _opened(points, length, spacing, given)
+    asked = (sha256(points.tobytes()).digest(), length, spacing)
+    opened = _OPENED.pop(asked) if asked in _OPENED else _opened(points, length, spacing, None)
+    _OPENED[asked] = opened
+    for oldest in list(_OPENED)[:-BODIES_KEPT]:
+        del _OPENED[oldest]
+    return opened
+
+
+def _opened(points: np.ndarray, length: float, spacing: float, given: GivenNormals | None) -> OpenedBody | None:
+    """Return the body that points (N, 3) enclose, opened and closed, as `opened_body`."""
     found = link_samples(points, max(WALL_SAMPLES * length, 0.25 * spacing), length, spacing, given)
     if len(found.mean) <= NEIGHBORS_AT_BOUNDARY:
         return None

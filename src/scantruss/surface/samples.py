@@ -191,6 +191,9 @@ def sample_surface(cloud: PointCloud, settings: Settings) -> SurfaceSamples:
 
 def _samples_of(cloud: PointCloud, asked: Asked, kept: dict[Asked, SurfaceSamples]) -> SurfaceSamples:
     """Return the samples that are asked for, by those that are kept, of which the oldest go to make room."""
+    for own, found in () if asked.limb_girth else kept.items():
+        if not found.rings and own._replace(limb_girth=0.0) == asked:  # limbs were looked for, but none was cut off
+            return found
     most = max(1, POINTS_OF_KEPT_SAMPLES // max(len(cloud.points), 1))
     for oldest in list(kept)[: max(0, len(kept) + 1 - most)]:
         del kept[oldest]
