@@ -20,7 +20,14 @@ from scantruss.boundary.find import find_boundary
 from scantruss.check.certify import Judged, judge
 from scantruss.constraints.find import find_constraints, wanted_ridges
 from scantruss.constraints.fold_tracing import Tracer
-from scantruss.constraints.lines_of_folds import GAIN_OF_SURE, is_clear_on_rough, is_even, is_made, parts_of_fold
+from scantruss.constraints.lines_of_folds import (
+    GAIN_OF_SURE,
+    is_clear_on_rough,
+    is_even,
+    is_long_edge,
+    is_made,
+    parts_of_fold,
+)
 from scantruss.constraints.ridge_ends import Ridge, join_ends
 from scantruss.constraints.ridges import find_ridges
 from scantruss.errors import FrontError
@@ -278,6 +285,17 @@ def test_a_wide_fold_is_an_edge_where_it_is_even_or_steep_along_four_members(
     folds = np.zeros(count, FOLD)
     folds["bend"], folds["gain"] = np.radians(bend), gain
     assert is_made(folds) == made
+
+
+@pytest.mark.parametrize(
+    ("bend", "gain", "count", "long"),
+    [(68, 900, 80, True), (68, 900, 40, False), (40, 900, 80, False), (68, 700, 80, False), (136, 900, 80, False)],
+)
+def test_a_steep_wide_fold_that_goes_on_is_an_edge(bend: float, gain: float, count: int, long: bool) -> None:
+    """As the base of a hand, 20 members around; the legs of a bunny have folds of 11, the crown of a bust a blunt one of 19."""
+    folds = np.zeros(count, FOLD)
+    folds["bend"], folds["gain"] = np.radians(bend), gain
+    assert is_long_edge(folds) == long and not is_made(folds)
 
 
 def test_lines_of_folds_are_parted_at_their_corners() -> None:

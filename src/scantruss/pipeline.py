@@ -179,9 +179,10 @@ def make_grid_with_wide_ridges(cloud: PointCloud, attempt: Attempt, *, progress:
     seen = _unseen(progress) if is_long else progress
     first = replace(attempt, settings=attempt.settings.replace(effort="normal")) if is_long else attempt
     plain = make_grid(cloud, first, progress=seen)
-    made = made_folds(samples, settings)
-    every = tuple(sorted({*made, *crests_cut_off(plain, crests, settings.length)}))
-    tried = {every: follows_better, made: follows_ridges_as_well}  # the second alone where both are the same
+    made, edges = made_folds(samples, settings)
+    every = tuple(sorted({*edges, *crests_cut_off(plain, crests, settings.length)}))
+    # the last alone where some are the same
+    tried = {every: follows_better, edges: follows_ridges_as_well, made: follows_ridges_as_well}
     for wide, is_taken in tried.items():
         asked = replace(first, wide=wide)
         folded, wide_taken = (

@@ -10,7 +10,7 @@ from ..boundary.curves import length_along
 from ..check.distances import distances_to_grid
 from ..check.left_out import points_together
 from ..check.limits import COVER_REACH, NOISES_OFF
-from ..constraints.lines_of_folds import FOLD_STRIDE, GAIN_OF_SURE, is_made
+from ..constraints.lines_of_folds import FOLD_STRIDE, GAIN_OF_SURE, is_long_edge, is_made
 from ..constraints.network import runs
 from ..constraints.ridges import fold_lines
 from ..errors import ScanTrussError
@@ -89,7 +89,7 @@ def lost_ridges(
 
 
 def _folds(cloud: PointCloud, settings: Settings) -> tuple[list[ClearFold], list[ClearFold]]:
-    """Return the narrow folds of a scan and the wide ones, each with whether it is clearly one: sure, or made."""
+    """Return the narrow folds of a scan and the wide ones, each with whether it is clearly one: sure, made or long."""
     try:
         samples = sample_surface(cloud, settings)
         found = None if samples.smooth else fold_lines(samples, settings)
@@ -98,7 +98,7 @@ def _folds(cloud: PointCloud, settings: Settings) -> tuple[list[ClearFold], list
     if found is None:
         return [], []
     narrow = [(folds, bool(np.median(folds["gain"]) >= GAIN_OF_SURE)) for folds in found.narrow]
-    return narrow, [(folds, is_made(folds)) for folds in found.wide]
+    return narrow, [(folds, is_made(folds) or is_long_edge(folds)) for folds in found.wide]
 
 
 def _may_cut_folds(grid: Grid, cloud: PointCloud, made: Settings, length: float) -> bool:

@@ -13,7 +13,7 @@ from ..errors import Place
 from ..kernels.mesh.point_location import nearest_sample
 from .fixed_lines import add_polylines
 from .fixed_nodes import check_fixed_positions
-from .lines_of_folds import is_made
+from .lines_of_folds import is_long_edge, is_made
 from .network import NO_LINES, Lines, Network
 from .ridge_ends import Ridge
 from .ridges import add_ridges, cut_around, find_ridges, fold_lines, given_up, without
@@ -110,10 +110,11 @@ def wide_folds(samples: SurfaceSamples, settings: Settings) -> list[np.ndarray]:
     return [folds["place"] for folds in fold_lines(samples, settings).wide] if wanted else []
 
 
-def made_folds(samples: SurfaceSamples, settings: Settings) -> tuple[int, ...]:
-    """Return the numbers of those that are as even as what was made: they are ridges wherever a grid follows them as well."""
+def made_folds(samples: SurfaceSamples, settings: Settings) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Return the numbers of those as even as what was made, and of these and long edges: ridges where a grid follows them as well."""
     found = fold_lines(samples, settings).wide
-    return tuple(number for number, folds in enumerate(found) if is_made(folds))
+    made = tuple(number for number, folds in enumerate(found) if is_made(folds))
+    return made, tuple(number for number, folds in enumerate(found) if number in made or is_long_edge(folds))
 
 
 def _on_pieces(ridge: Ridge, samples: SurfaceSamples) -> bool:

@@ -12,6 +12,8 @@ GAIN_OF_SURE = 90.0  # median gain of a line of folds that is sure, at least
 GAIN_OF_MADE, LEAST_MADE = 1200.0, 4.0  # the same of one that was made, and its length [member lengths]
 # bend from which on a fold is an edge, as waves are less steep, and median gain of such a line that was made or broke off
 BEND_OF_EDGE, GAIN_OF_EDGE = np.radians(85.0), 500.0
+# bend, median gain and length of a wide fold that goes on for longer than one that has grown [member lengths]
+STEEP_FOLD, GAIN_OF_LONG, LONG_WIDE = np.radians(60.0), 800.0, 12.0
 LEAST_ROUGH_RIDGE = 6.0  # least length of a line of folds on a rough scan [member lengths]
 # share of the ridge angle by which half of such a line is folded at least, where it is not sure and longer
 ROUGH_SHARE = 1.4
@@ -61,6 +63,12 @@ def is_made(folds: np.ndarray) -> bool:
     is_edge = BEND_OF_EDGE <= np.median(folds["bend"]) < TURNS_BACK
     least = GAIN_OF_EDGE if is_edge else GAIN_OF_MADE
     return len(folds) * FOLD_STRIDE >= LEAST_MADE and bool(np.median(folds["gain"]) >= least)
+
+
+def is_long_edge(folds: np.ndarray) -> bool:
+    """Whether a line of wide folds (K,) FOLD is steep and goes on for longer than what has grown, if less even than what was made."""
+    bend, gain = np.median(folds["bend"]), np.median(folds["gain"])
+    return len(folds) * FOLD_STRIDE >= LONG_WIDE and bool(STEEP_FOLD <= bend < TURNS_BACK and gain >= GAIN_OF_LONG)
 
 
 def is_sure(folds: np.ndarray, angle: float) -> bool:
