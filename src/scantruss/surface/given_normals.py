@@ -18,7 +18,7 @@ BESIDE_SINE = 0.3  # sine of the angle to its plane below which the nearest poin
 MOST_OPPOSITE = 0.1  # share of them that may face opposite to one beside them; of normals of either sign half do
 # nearest points that decide whether a normal is turned, how many of them must face opposite to it, and how many lie beside its point at
 # least: the other side of a thin wall lies behind it; rounds, as those that are turned decide on others
-NEAREST, MOST_OF_NEAREST, FEWEST_BESIDE, ROUNDS = 12, 10, 3, 8
+NEAREST, MOST_OF_NEAREST, FEWEST_BESIDE, TURNING_ROUNDS = 12, 10, 3, 8
 AT_A_POINT = 1e-6  # distance from a point within which a place has its normal [extent of the scan]
 
 _NORMALS_OF_CLOUDS: weakref.WeakKeyDictionary[PointCloud, GivenNormals | None] = weakref.WeakKeyDictionary()
@@ -54,7 +54,7 @@ class GivenNormals:
     def _turn_to_others(self, points: np.ndarray) -> None:
         """Turn those normals of points (N, 3) that face opposite to nearly all around them."""
         unit, next_one = self.normals, self._nearest(points, 2)[0]
-        for _ in range(ROUNDS):
+        for _ in range(TURNING_ROUNDS):
             doubtful = np.flatnonzero((unit * unit[next_one]).sum(axis=1) < 0.0)
             others = np.stack([self._nearest(points[doubtful], rank)[0] for rank in range(2, NEAREST + 2)])
             opposite = ((unit[doubtful] * unit[others]).sum(axis=2) < 0.0).sum(axis=0)
