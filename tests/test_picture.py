@@ -15,7 +15,8 @@ from small_grids import cloud_over, dome, fan, icosahedron, make_grid, two_piece
 from typed import known, xyz
 
 import scantruss as st
-from scantruss.export.drawing.camera import choose_camera, map_depth
+from scantruss.export.drawing.camera import choose_camera
+from scantruss.export.drawing.depth import map_depth
 from scantruss.export.drawing.left_out import LEFT_OUT_COLOUR, NO_GRID_COLOUR, OUT_OF_REACH_COLOUR, shown_points
 from scantruss.export.drawing.legend import FAULT_COLOUR, places_marked, round_bar, scale_bar
 from scantruss.export.drawing.picture import PANELS_SIZE, PICTURE_SIZE, draw_panels, encode_picture
