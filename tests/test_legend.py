@@ -13,7 +13,7 @@ import scantruss as st
 from scantruss.export.drawing import picture
 from scantruss.export.drawing.camera import choose_camera
 from scantruss.export.drawing.left_out import NO_GRID_COLOUR, Missed, Shown
-from scantruss.export.drawing.legend import Legend, Row
+from scantruss.export.drawing.legend import Legend, Row, legends
 from scantruss.export.drawing.picture import encode_picture
 from scantruss.export.drawing.style import PictureStyle
 from scantruss.grid.certificate import Certificate, Fault, LeftOut
@@ -143,7 +143,59 @@ def test_a_long_legend_says_the_faults_first_and_how_much_more_there_is(monkeypa
     texts = texts_of(dome().replace(certificate=replace(NOTHING_FOUND, faults=faults, warnings=warnings)), monkeypatch)
     said = [text.words for text in texts if text.align == "left" and len(text.words) > 1]
     assert said[0] == "This grid fails its certificate:" and said[1:13] == [fault.words for fault in faults]
-    assert len(said) == picture.MOST_LEGEND_ROWS and said[-1] == f"and {1 + 30 - 19} more"
+    assert (
+        len(said) == picture.MOST_LEGEND_ROWS and said[-1] == f"and {1 + 30 - 19} more, listed in a report (--report)"
+    )
+
+
+def warned(grid: st.Grid, number: int) -> st.Grid:
+    """A grid with so many warnings, as many gaps bridged, and places for all of them."""
+    places = [xyz(node) for node in grid.nodes]
+    warnings = tuple(Fault(f"w{k}", f"is odd in way {k}" + " and in a few more" * 2, places[k]) for k in range(number))
+    gaps = tuple(LeftOut("gap", 0, 0.0, place, 1.5) for place in places[number : 2 * number])
+    return grid.replace(certificate=replace(NOTHING_FOUND, warnings=warnings, left_out=gaps))
+
+
+@pytest.mark.parametrize("stretch", [(1.0, 1.0, 1.0), (1.0, 1.0, 4.0), (5.0, 1.0, 1.0)])
+@pytest.mark.parametrize("views", [("auto",), ("auto", "front")])
+def test_a_long_legend_leaves_more_than_half_of_the_picture_to_the_grid(
+    stretch: tuple[float, ...], views: tuple[str, ...], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With twenty lines one below the other, a retaining wall and an elk took a sixth of their pictures."""
+    grid = dome(unit="m")
+    grid = grid.replace(nodes=grid.nodes * stretch)
+    painted: list[Any] = []
+
+    def paint(*given: Any) -> bytes:
+        painted.append(given)
+        return b""
+
+    monkeypatch.setattr(picture, "paint", paint)
+    for each in (grid, warned(grid, 20)):
+        encode_picture(each, None, style=PictureStyle(views=views))
+    plain, full = (np.concatenate([s.shape.reshape(-1, 2) for s in given[1][1:]]) for given in painted)
+    assert (np.ptp(full, axis=0) > 0.6 * np.ptp(plain, axis=0)).all()
+    lines = [text for text in painted[1][2] if text.align == "left"]
+    assert max(text.x + 0.62 * text.size * len(text.words) for text in lines) < painted[1][0][0]
+
+
+def test_a_short_legend_has_one_column_and_lines_that_go_on_stay_together() -> None:
+    rows = [Row("a word " * 30, str(number)) for number in range(1, 13)]
+    (one,) = legends(rows[:1], 1500.0, (0.0, 0.0), 15.0)
+    assert one.columns == [one.rows]
+    for legend in legends(rows, 1500.0, (0.0, 0.0), 15.0):
+        assert len(legend.columns) <= legend.number
+        assert not any(column[0].goes_on for column in legend.columns)
+        assert [row for column in legend.columns for row in column] == legend.rows
+
+
+def test_each_number_in_a_picture_is_in_its_legend(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those of which the line is left out, as the legend is long, are not drawn."""
+    texts = texts_of(warned(dome(), 20), monkeypatch)
+    drawn = {text.words for text in texts if text.over}
+    explained = {text.words for text in texts if text.align == "left" and len(text.words) < 3}
+    assert len(drawn) > 10 and drawn <= explained
+    assert any(text.words.endswith(" more, listed in a report (--report)") for text in texts)
 
 
 def test_each_ring_has_the_number_of_its_warning(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -15,7 +15,8 @@ from small_grids import cloud_over, dome, fan, icosahedron, make_grid, two_piece
 from typed import known, xyz
 
 import scantruss as st
-from scantruss.export.drawing.camera import choose_camera, map_depth
+from scantruss.export.drawing.camera import choose_camera
+from scantruss.export.drawing.depth import map_depth
 from scantruss.export.drawing.left_out import LEFT_OUT_COLOUR, NO_GRID_COLOUR, OUT_OF_REACH_COLOUR, shown_points
 from scantruss.export.drawing.legend import FAULT_COLOUR, places_marked, round_bar, scale_bar
 from scantruss.export.drawing.picture import PANELS_SIZE, PICTURE_SIZE, draw_panels, encode_picture
@@ -410,7 +411,9 @@ def test_the_legend_lies_beside_or_above_what_is_shown(
     encode_picture(grid.replace(certificate=found), cloud_over(grid), style=PictureStyle(views=views, size=size))
     (_, strokes, texts, _, _), *_ = painted
     lines = [text for text in texts if text.align == "left"]
-    assert len(lines) == 21 + bool(guessed_up(grid))
+    said = " ".join(text.words for text in lines)
+    assert all(f"of {k} degrees" in said for k in range(5)) and ("up, guessed" in said) == bool(guessed_up(grid))
+    assert len(lines) >= 21 + bool(guessed_up(grid))
     right = max(text.x + 0.62 * text.size * len(text.words) for text in lines)
     low, high = min(text.y for text in lines) - lines[0].size, max(text.y for text in lines) + lines[0].size
     for each in strokes[1:]:  # the first is the shadow

@@ -34,9 +34,17 @@ class Camera:
         """Return (N, 2) places in the picture [pixel] and (N,) nearness, larger in front [scan unit]."""
         local = points - self.middle
         near = local @ self.back
-        factor = self.zoom * self.distance / np.maximum(self.distance - near, 0.05 * self.distance)
-        flat = np.stack([local @ self.right, local @ self.up], axis=1) * factor[:, None]
+        flat = np.stack([local @ self.right, local @ self.up], axis=1) * self.scale(near)[:, None]
         return flat + np.array(self.shift), near
+
+    def scale(self, near: np.ndarray) -> np.ndarray:
+        """Return how large things are that are so near: [pixel] per scan unit."""
+        scale: np.ndarray = self.zoom * self.distance / np.maximum(self.distance - near, 0.05 * self.distance)
+        return scale
+
+    def nearness(self, scale: np.ndarray) -> np.ndarray:
+        """Return how near things are that are so large: the opposite of `scale`."""
+        return self.distance * (1.0 - self.zoom / scale)
 
     def around(self, points: np.ndarray) -> Camera:
         """Return a camera that looks the same way at the middle of other points."""
@@ -122,41 +130,3 @@ def _front(nodes: np.ndarray, ground: np.ndarray, facing: np.ndarray, openness: 
         second = np.cross(ground, first)
     front: np.ndarray = math.cos(turn) * first - math.sin(turn) * second
     return front
-
-
-def map_depth(corners: np.ndarray, near: np.ndarray, shape: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
-    """Return what is in front at each pixel.
-
-    Parameters
-    ----------
-    corners : np.ndarray
-        (T, 3, 2) corners of triangles [pixel].
-    near : np.ndarray
-        (T, 3) nearness of the corners [scan unit].
-    shape : tuple of int
-        Rows and columns of the map.
-
-    Returns
-    -------
-    nearest : np.ndarray
-        (rows, columns) nearness of what is in front, -inf if nothing is [scan unit].
-    triangle : np.ndarray
-        (rows, columns) int64 triangle in front, -1 where none is.
-    """
-    nearest, triangle = np.full(shape, -np.inf), np.full(shape, -1, np.int64)
-    low = np.clip(np.floor(corners.min(axis=1)).astype(int), 0, (shape[1], shape[0]))
-    high = np.clip(np.ceil(corners.max(axis=1)).astype(int) + 1, 0, (shape[1], shape[0]))
-    side, other = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    double_area = side[:, 0] * other[:, 1] - side[:, 1] * other[:, 0]
-    for t in np.flatnonzero((np.abs(double_area) > 1e-9) & (high > low).all(axis=1)).tolist():
-        columns = np.arange(low[t, 0], high[t, 0])
-        rows = np.arange(low[t, 1], high[t, 1])[:, None]
-        x, y = columns - corners[t, 0, 0], rows - corners[t, 0, 1]
-        u = (x * other[t, 1] - y * other[t, 0]) / double_area[t]
-        v = (side[t, 0] * y - side[t, 1] * x) / double_area[t]
-        depth = near[t, 0] + u * (near[t, 1] - near[t, 0]) + v * (near[t, 2] - near[t, 0])
-        window = np.s_[low[t, 1] : high[t, 1], low[t, 0] : high[t, 0]]
-        front = (u >= 0) & (v >= 0) & (u + v <= 1) & (depth > nearest[window])
-        nearest[window][front] = depth[front]
-        triangle[window][front] = t
-    return nearest, triangle

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from textwrap import wrap
 from typing import NamedTuple
@@ -19,6 +19,7 @@ FAULT_COLOUR, WARNING_SIGN_COLOUR = np.array([0.78, 0.05, 0.10]), np.array([0.80
 MOST_MARKS = 5  # marks of a kind in a picture
 # of a legend: from line to line, of a sign, of a letter on average at most [em]
 LEGEND_LINE, LEGEND_SIGN, LEGEND_LETTER = 1.6, 1.4, 0.62
+LONGEST_COLUMN = 10  # lines of a column of a legend; a longer legend may have up to three
 # share of the width and height of a picture that is left to the grid however long the legend is
 LEAST_LEFT_BY_LEGEND = 0.2
 BAR_SHARE = 0.18  # largest share of the width that a scale bar takes
@@ -47,6 +48,7 @@ class Row(NamedTuple):
     words: str
     sign: str = ""  #: before them; without it the line is a heading or a remark
     colour: np.ndarray = INK_COLOUR  #: (3,) of the sign, or of a line without one
+    goes_on: bool = False  #: with the words of the line above
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,30 +58,44 @@ class Legend:
     rows: list[Row]
     corner: tuple[float, float]  #: (x, y) of the first line [pixel]
     em: float  #: height of the letters [pixel]
+    number: int = 1  #: of columns
+    apart: float = 0.0  #: from column to column [pixel]
+
+    @property
+    def columns(self) -> list[list[Row]]:
+        """The lines of each column."""
+        made: list[list[Row]] = [[]]
+        for row in self.rows:
+            if len(made[-1]) >= len(self.rows) / self.number and not row.goes_on:
+                made.append([])
+            made[-1].append(row)
+        return made
 
     @property
     def texts(self) -> list[Text]:
         """The legend as words in the picture."""
-        (x, y), em, texts = self.corner, self.em, []
-        for number, row in enumerate(self.rows):
-            at = y - number * LEGEND_LINE * em
-            words = Text(x + signs_wide(self.rows) * em, at, row.words, em, "left")
-            texts += [Text(x, at, row.sign, em, "left", row.colour), words] if row.sign else []
-            texts += [] if row.sign else [Text(x, at, row.words, em, "left", row.colour)]
+        em, texts = self.em, []
+        for column, rows in enumerate(self.columns):
+            x = self.corner[0] + column * self.apart
+            for line, row in enumerate(rows):
+                at = self.corner[1] - line * LEGEND_LINE * em
+                words = Text(x + signs_wide(self.rows) * em, at, row.words, em, "left")
+                texts += [Text(x, at, row.sign, em, "left", row.colour), words] if row.sign else []
+                texts += [] if row.sign else [Text(x, at, row.words, em, "left", row.colour)]
         return texts
 
     def boxes_beside(
         self, box: tuple[float, float, float, float], *, alone: bool
     ) -> list[tuple[float, float, float, float]]:
-        """Return the parts of a box (left, bottom, right, top) [pixel] below the legend, and to its right if that view is `alone`."""
+        """Return the parts of a box (left, bottom, right, top) [pixel] below the legend, and beside one column if that view is `alone`."""
         if not self.rows:
             return [box]
         left, bottom, right, top = box
         wide = signs_wide(self.rows) + LEGEND_LETTER * max(len(row.words) for row in self.rows)
-        end = self.corner[1] - (len(self.rows) * LEGEND_LINE + 0.4) * self.em
+        end = self.corner[1] - (max(map(len, self.columns)) * LEGEND_LINE + 0.4) * self.em
         below = (left, bottom, right, max(min(top, end), bottom + LEAST_LEFT_BY_LEGEND * (top - bottom)))
         beside = (self.corner[0] + (wide + 2.0) * self.em, bottom, right, top)
-        fits = alone and right - beside[0] > LEAST_LEFT_BY_LEGEND * (right - left)
+        fits = alone and self.number == 1 and right - beside[0] > LEAST_LEFT_BY_LEGEND * (right - left)
         return [below, beside] if fits else [below]
 
 
@@ -116,8 +132,20 @@ def wrapped_rows(rows: Iterable[Row], wide: float, em: float) -> list[Row]:
     for row in given:
         first, *more = wrap(row.words, most) or [""]
         below = row.sign and " "
-        lines += [row._replace(words=first), *(Row(words, below, row.colour) for words in more)]
+        lines += [row._replace(words=first), *(Row(words, below, row.colour, True) for words in more)]
     return lines
+
+
+def legends(rows: Iterable[Row], wide: float, corner: tuple[float, float], em: float) -> list[Legend]:
+    """Return a legend in one column, and a long one also in two and three, as the grid may then have more room."""
+    given, made = list(rows), []
+    for number in (1, 2, 3):
+        apart = wide / number
+        lines = wrapped_rows(given, apart - (2 * em if number > 1 else 0), em)
+        made.append(Legend(lines, corner, em, number, apart))
+        if len(lines) <= number * LONGEST_COLUMN:
+            break
+    return made
 
 
 def places_marked(grid: Grid) -> list[Mark]:
@@ -160,14 +188,18 @@ def rows_of_marks(grid: Grid) -> list[Row]:
     return rows
 
 
-def rings_and_numbers(grid: Grid, camera: Camera, em: float) -> tuple[list[Ring], list[Text]]:
-    """Return a ring at each place to look at, small at further places of a kind, and its number beside each.
+def rings_and_numbers(
+    grid: Grid, camera: Camera, em: float, explained: Collection[str]
+) -> tuple[list[Ring], list[Text]]:
+    """Return a ring at each place of which the number is explained, small at further places of a kind, and its number beside each.
 
     Small rings that lie together share a number.
     """
     rings: list[Ring] = []
     words: list[str] = []
     for number, mark in enumerate(places_marked(grid), 1):
+        if str(number) not in explained:
+            continue
         flat, _ = camera.project(np.array([mark.where, *mark.also]) - grid.origin)
         sizes = [RING_SIZE * em, *[SMALL_RING_SIZE * em] * len(mark.also)]
         rings += [Ring(x, y, size, mark.colour) for (x, y), size in zip(flat.tolist(), sizes, strict=True)]

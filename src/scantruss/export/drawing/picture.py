@@ -1,6 +1,6 @@
 """Pictures: the grid over its scan, and three panels (scan, grid, printed model).
 
-The painter's way: everything is projected, sorted by depth and painted back to front by matplotlib's Agg, without
+The painter's way: everything is projected, sorted such that what is in front comes last, and painted by matplotlib's Agg, without
 pyplot and without any state that outlives the call. The same grid gives the same bytes.
 """
 
@@ -20,19 +20,18 @@ from ...runtime.files import write_files
 from ...runtime.ours import MADE_BY
 from ...runtime.places import check_place
 from ...scan.cloud import PointCloud
-from .camera import choose_camera
+from .camera import Camera, choose_camera
 from .left_out import Shown, shown_points
 from .legend import (
     FAULT_COLOUR,
-    Legend,
     Ring,
     Row,
     Text,
+    legends,
     places_marked,
     rings_and_numbers,
     rows_of_marks,
     scale_bar,
-    wrapped_rows,
 )
 from .strokes import (
     INK_COLOUR,
@@ -55,6 +54,7 @@ from .style import PictureStyle
 if TYPE_CHECKING:
     from PIL.Image import Image
 
+Box = tuple[float, float, float, float]  #: left, bottom, right and top of a part of a picture [pixel]
 PICTURE_SIZE = (1600, 1200)  #: of a picture [pixel]
 MOST_LEGEND_ROWS = 20  # rows of the legend of a picture, so that it leaves room for the grid
 PANELS_SIZE = (2400, 800)  #: of three panels, or of several views [pixel]
@@ -85,35 +85,41 @@ def encode_picture(
     lines: list[np.ndarray] = []
     if len(grid.triangles):
         shown = shown_points(grid, cloud) if cloud is not None else None
-        rows = wrapped_rows(_legend_rows(grid, cloud, shown), wide - 12 * em, em) if caption else []
-        legend = Legend(rows, (6 * em, tall - 4.1 * em), em)
-        width = wide / len(style.views)
-        for number, name in enumerate(style.views):
-            camera = choose_camera(grid.nodes, grid.triangles, known_upward(grid, cloud), name)
-            box = (
-                width * number + 6 * em,
-                (7.5 if caption else 5) * em,
-                width * (number + 1) - 6 * em,
-                tall - 5.5 * em,
-            )
-            more = None if shown is None else some_of(shown.framed, MOST_POINTS[True])
-            fitted = [
-                (framed(grid.nodes, grid.triangles, camera, each, more), each)
-                for each in legend.boxes_beside(box, alone=len(style.views) == 1)
-            ]
-            camera, box = max(fitted, key=lambda each: each[0].zoom)  # with room for the legend
+        rows = _legend_rows(grid, cloud, shown) if caption else []
+        width, upward = wide / len(style.views), known_upward(grid, cloud)
+        cameras = [choose_camera(grid.nodes, grid.triangles, upward, name) for name in style.views]
+        low, high = (7.5 if caption else 5) * em, tall - 5.5 * em
+        boxes = [(width * k + 6 * em, low, width * (k + 1) - 6 * em, high) for k in range(len(cameras))]
+        more = None if shown is None else some_of(shown.framed, MOST_POINTS[True])
+        fits = [
+            (legend, _fit(grid, cameras, [legend.boxes_beside(box, alone=len(boxes) == 1) for box in boxes], more))
+            for legend in legends(rows, wide - 12 * em, (6 * em, tall - 4.1 * em), em)
+        ]
+        legend, fitted = max(fits, key=lambda fit: min(camera.zoom for camera, _ in fit[1]))
+        for number, (camera, box) in enumerate(fitted):
             view = look(grid.nodes, grid.triangles, camera, (wide, tall))
             strokes += grid_strokes(grid, None if shown is None else shown.followed, view)
             strokes += [missed_strokes(part.points, part.colour, view, box) for part in (shown.missed if shown else ())]
             if caption:
                 line, words = scale_bar(view.camera, box[2], 4.7 * em, width, grid.unit, em)
                 lines, texts = [*lines, line], [*texts, words]
-                more_rings, numbers = rings_and_numbers(grid, view.camera, em)
+                more_rings, numbers = rings_and_numbers(grid, view.camera, em, {row.sign for row in rows})
                 rings, texts = [*rings, *more_rings], [*texts, *numbers]
                 if len(style.views) > 1:
-                    texts.append(Text(width * (number + 0.5), tall - 2.5 * em, name, 1.2 * em))
+                    texts.append(Text(width * (number + 0.5), tall - 2.5 * em, style.views[number], 1.2 * em))
         texts += legend.texts
     return paint((wide, tall), strokes, texts, rings, lines)
+
+
+def _fit(
+    grid: Grid, cameras: Sequence[Camera], boxes: Sequence[Sequence[Box]], more: np.ndarray | None
+) -> list[tuple[Camera, Box]]:
+    """Return each camera framed in the one of its boxes [pixel] in which the grid and further points (N, 3) are largest, and that box."""
+    tried = [
+        [(framed(grid.nodes, grid.triangles, camera, box, more), box) for box in some]
+        for camera, some in zip(cameras, boxes, strict=True)
+    ]
+    return [max(some, key=lambda each: each[0].zoom) for some in tried]
 
 
 def plot_grid(grid: Grid, cloud: PointCloud | None, views: tuple[str, ...], size: tuple[int, int] | None) -> Image:
@@ -124,17 +130,21 @@ def plot_grid(grid: Grid, cloud: PointCloud | None, views: tuple[str, ...], size
 
 
 def _legend_rows(grid: Grid, cloud: PointCloud | None, shown: Shown | None) -> list[Row]:
-    """Return what colours and numbers mean, line by line."""
+    """Return what colours and numbers mean, line by line: faults first."""
+    missed, unread = (shown.missed, shown.unread) if shown else ((), ())
     failed = grid.certificate is not None and not grid.certificate.passed
-    rows = [Row("This grid fails its certificate:", "", FAULT_COLOUR)] * failed
-    for part in shown.missed if shown else ():
+    marks = sorted(rows_of_marks(grid), key=lambda row: row.colour is not FAULT_COLOUR)
+    room = MOST_LEGEND_ROWS - failed - len(missed) - len(unread)
+    if len(marks) > room:
+        marks = [*marks[: room - 1], Row(f"and {len(marks) - room + 1} more, listed in a report (--report)", "+")]
+    rows, explained = [Row("This grid fails its certificate:", "", FAULT_COLOUR)] * failed, {row.sign for row in marks}
+    rows += [row for row in marks if row.colour is FAULT_COLOUR]
+    for part in missed:
         numbers = [str(number) for number, mark in enumerate(places_marked(grid), 1) if mark.kind == part.kind]
+        numbers = [number for number in numbers if number in explained]
         rows.append(Row(f"{part.words}{', at ' if numbers else ''}{', '.join(numbers)}", "\u25cf", part.colour))
-    rows += [Row(words) for words in (shown.unread if shown else ())]
-    rows = [*rows, *rows_of_marks(grid)]
-    if len(rows) > MOST_LEGEND_ROWS:  # the terminal and the report have them all
-        rows.sort(key=lambda row: row.colour is not FAULT_COLOUR)
-        rows = [*rows[: MOST_LEGEND_ROWS - 1], Row(f"and {len(rows) - MOST_LEGEND_ROWS + 1} more", "+")]
+    rows += [Row(words) for words in unread]
+    rows += [row for row in marks if row.colour is not FAULT_COLOUR]
     return [*rows, *(Row(words) for words in picture_notes(grid, cloud))]
 
 

@@ -9,10 +9,12 @@ import numpy as np
 
 from ...grid.grid import Grid
 from ...scan.cloud import PointCloud
-from .camera import Camera, map_depth
+from .camera import Camera
+from .depth import hidden_pairs, map_depth, raised_keys
 
 # by how much a triangle of which the inside is seen counts as farther back: behind the outside of a thin wall, never through it [sides]
 INSIDE_BEHIND = 0.5
+MEMBERS_BEFORE = 1e-9  # by how much members are painted before their triangles [distance of the eye]
 MOST_POINTS = {True: 40_000, False: 120_000}  #: of the scan that are drawn, over a grid and alone
 PAPER_COLOUR = np.array([0.984, 0.980, 0.969])  # background
 GROUND_COLOUR = np.array([0.925, 0.918, 0.898])  # shadow on the ground
@@ -52,7 +54,10 @@ class CameraView:
 
     camera: Camera
     corners: np.ndarray  #: (T, 3, 2) [pixel]
-    key: np.ndarray  #: (T,) nearness of the middle of each triangle, less where its inside is seen [scan unit]
+    middle: np.ndarray  #: (T,) nearness of the middle of each triangle [scan unit]
+    key: (
+        np.ndarray
+    )  #: (T,) the same, less where its inside is seen, and raised above that of the triangles that it hides
     light: np.ndarray  #: (T,) how much light each gets, 0 to 1
     outside: np.ndarray  #: (T,) bool, whether its outside is seen
     depth: tuple[float, float]  #: nearness of the farthest and the nearest node [scan unit]
@@ -81,11 +86,15 @@ def look(
     light = 0.16 + 0.70 * np.clip(normal @ key_light, 0, 1) + 0.22 * np.clip(normal @ fill_light, 0, 1)
     used = near[np.unique(triangles)]
     rows, columns = (size[1] // 2, size[0] // 2) if mapped else (0, 0)
-    nearest, front = map_depth(corners / 2, depth, (rows, columns))
+    scale = camera.scale(depth)  # changes evenly across a triangle in the picture, as nearness does not
+    largest, front = map_depth(corners / 2, scale, (rows, columns))
+    nearest = np.where(front >= 0, camera.nearness(largest), -np.inf)
     span = (float(used.min()), float(used.max()))
     side = float(np.sqrt(((b - a) ** 2).sum(axis=1).mean()))
-    key = depth.mean(axis=1) - np.where(outside, 0.0, INSIDE_BEHIND * side)
-    return CameraView(camera, corners, key, np.clip(light, 0, 1), outside, span, nearest, front)
+    middle = depth.mean(axis=1)
+    key = middle - np.where(outside, 0.0, INSIDE_BEHIND * side)
+    key = raised_keys(key, hidden_pairs(corners / 2, scale, largest, front), 2.0 * MEMBERS_BEFORE * camera.distance)
+    return CameraView(camera, corners, middle, key, np.clip(light, 0, 1), outside, span, nearest, front)
 
 
 def _unit(vector: np.ndarray) -> np.ndarray:
@@ -131,7 +140,7 @@ def _surface_strokes(
 ) -> Strokes:
     """Return the shaded triangles of a view."""
     colour = np.where(view.outside[:, None], _mix(outside, view.light), _mix(inside, view.light))
-    colour = _hazy(colour, view.fade(view.key), 0.30)
+    colour = _hazy(colour, view.fade(view.middle), 0.30)
     return Strokes(view.key, view.corners, colour, colour, np.full(len(colour), 0.6))
 
 
@@ -197,7 +206,9 @@ def _member_strokes(grid: Grid, view: CameraView) -> Strokes:
     bold = boundary | grid.edge_on_line
     colour = np.where(bold[:, None], _hazy(BOUNDARY_COLOR, fade, 0.45), _hazy(INK_COLOUR, fade, 0.60))
     widths = np.where(bold, 1.9 * width, width)
-    return Strokes(key + 1e-9 * view.camera.distance, flat[ends[:, [0, 1, 1]]], np.zeros_like(colour), colour, widths)
+    return Strokes(
+        key + MEMBERS_BEFORE * view.camera.distance, flat[ends[:, [0, 1, 1]]], np.zeros_like(colour), colour, widths
+    )
 
 
 def placed(cloud: PointCloud, grid: Grid) -> np.ndarray:
