@@ -24,7 +24,7 @@ from scantruss.attempts.table import Attempt
 from scantruss.boundary import find
 from scantruss.check.crossings import MOST_CROSSINGS
 from scantruss.cli.main import main
-from scantruss.errors import FrontError
+from scantruss.errors import FrontError, OneSidedError
 from scantruss.grid.certificate import Certificate, Fault, LeftOut
 from scantruss.report import ladder
 from scantruss.report.advice import Advice
@@ -254,6 +254,48 @@ def test_where_no_length_passes_the_most_frequent_cause_is_said_with_its_place()
     stopped = [LengthTrial(1.0, None, FrontError("the front stopped; try another", None, (0.0, 1.0, 2.0)))]
     assert usual_cause(stopped) == ", 1 of 1 as the front stopped (near 0, 1, 2); clean or crop the scan there first"
     assert usual_cause([]) == "; clean or crop the scan first"
+
+
+def test_where_no_length_passes_as_walls_are_thinner_than_members_that_is_said() -> None:
+    """A clean scan of a bridge with a thin deck was to be cleaned or cropped."""
+    trials = [LengthTrial(length, None, FrontError("the front cannot close")) for length in (0.5, 1.0, 2.0)]
+    said = usual_cause(trials, (0.8, 0.12))
+    assert (
+        "; 12% of the scan is walls about 0.8 thick, thinner than most of these members: scan them more densely" in said
+    )
+    assert "clean" not in said
+    for wall in ((0.8, 0.05), (2.5, 0.5), (0.0, 0.0)):  # too little of it, or members are shorter
+        assert usual_cause(trials, wall).endswith("; clean or crop the scan there first")
+
+
+def test_the_wall_of_a_scan_is_measured_where_it_is_a_small_part() -> None:
+    """A block with a fin."""
+    rng = np.random.default_rng(5)
+    block = rng.uniform(-10.0, 10.0, (15_000, 3))
+    side = rng.integers(0, 3, len(block))
+    block[np.arange(len(block)), side] = rng.choice([-10.0, 10.0], len(block))
+    fin = np.column_stack(
+        [rng.uniform(10.0, 20.0, 4_000), rng.choice([-0.3, 0.3], 4_000), rng.uniform(-10.0, 10.0, 4_000)]
+    )
+    thickness, share = Advice(st.PointCloud.from_array(np.vstack([block, fin])), st.Settings(length=1.0)).wall
+    assert thickness == pytest.approx(0.6, abs=0.1) and 0.1 < share < 0.3
+    assert Advice(st.PointCloud.from_array(block), st.Settings(length=1.0)).wall[1] < 0.05
+
+
+def test_info_ends_with_why_no_length_passes_and_not_with_another_reason(
+    place: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """After a line on triangles that cut each other came one that a scan is one-sided."""
+
+    def one_sided(*_: Any, **__: Any) -> None:
+        raise OneSidedError("the scanned surface is one-sided")
+
+    counted_runs(monkeypatch, lambda length: False)
+    monkeypatch.setattr(find, "find_boundary", one_sided)
+    assert main(["info", "limpet.xyz"]) == 0
+    said = capsys.readouterr()
+    assert "one-sided" not in said.out + said.err
+    assert said.out.splitlines()[-1].startswith("no length passes of those tried")
 
 
 def test_a_suggestion_and_its_table_cost_no_more_than_so_many_grids_and_points(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import Namespace
 from typing import TYPE_CHECKING
 
-from ..errors import words_of_number
+from ..errors import OneSidedError, words_of_number
 from .shared import (
     SCAN_HELP,
     add_memory,
@@ -72,7 +72,14 @@ def info(values: Namespace) -> None:
                 passing = [trial.grid for trial in advice.tried if trial.passed and trial.length == length]
                 made = passing[0].settings if passing and passing[0] is not None else None
                 settings = (made or advice.settings).replace(length=length, effort=settings.effort)
-            samples, boundary = find_boundary(sample_surface(cloud, settings), settings, progress=bars)
+            try:
+                samples, boundary = find_boundary(sample_surface(cloud, settings), settings, progress=bars)
+            except OneSidedError as error:
+                if settings.length_field or str(error) in {
+                    str(each.fault) for each in advice.tried if each.length == length
+                }:
+                    raise
+                return  # why no length passes was said, and it is another reason
         note_outliers(bars, cloud, settings, "scantruss grid")
         note_layers(bars, cloud, settings)
         note_pieces(bars, cloud, settings)

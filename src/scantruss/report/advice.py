@@ -376,6 +376,11 @@ class Advice:
         return sample_surface(self._cloud, self._settings.replace(length=self._usual)).area
 
     @cached_property
+    def wall(self) -> tuple[float, float]:
+        """How thick the walls are that are thinner than the usual length [scan unit], and their share of the scan."""
+        return ladder.thin_wall(self._cloud, self._settings, self._usual)
+
+    @cached_property
     def radius(self) -> float:
         """The radius to which nearly all of the scan is bent less [scan unit]; inf where all is flat."""
         samples = sample_surface(self._cloud, self._settings.replace(length=self._usual))

@@ -59,6 +59,7 @@ HOPELESS_NEARBY = 2
 HOPELESS_LENGTHS = 3
 # lengths that are tried beside the usual one where none of these passes, as multiples of it
 BESIDE_USUAL = (1.12, 0.9, 1.25)
+SOME_WALL = 0.1  # share of a scan on thin walls from which on these are named where no length passes
 
 
 def usual_length(cloud: PointCloud, settings: Settings) -> float:
@@ -96,7 +97,12 @@ def length_of_wall(cloud: PointCloud, settings: Settings, usual: float) -> float
 
     usual : length below which a wall is thin
     """
-    samples = sample_surface(cloud, settings.replace(length=max(0.5 * usual, length_range(cloud)[0])))
-    thickness, share = wall_of_surface(samples, usual)
+    thickness, share = thin_wall(cloud, settings, usual)
     length = LENGTH_OF_WALL * thickness
     return length if share >= MOSTLY_WALL and length >= LEAST_OF_WALL * cloud.spacing else None
+
+
+def thin_wall(cloud: PointCloud, settings: Settings, usual: float) -> tuple[float, float]:
+    """Return how thick walls are that are thinner than the usual length [scan unit], and the share of the scan that they are."""
+    samples = sample_surface(cloud, settings.replace(length=max(0.5 * usual, length_range(cloud)[0])))
+    return wall_of_surface(samples, usual)

@@ -9,6 +9,7 @@ import numpy as np
 from ..attempts.limit import only_leaves_out
 from ..check.refusal import MOST_ACCEPTED, option_accepting
 from ..errors import words_of_number, words_of_place
+from .ladder import SOME_WALL
 
 if TYPE_CHECKING:
     from ..errors import Place
@@ -110,7 +111,11 @@ def advice_lines(advice: Advice, length: float, cloud: PointCloud) -> list[str]:
         near = min(passing, key=lambda other: abs(np.log(other / length)), default=None)
         near = advice.nearby(length) if near is None and not advice.is_spent else near
         lines += [f"at {length:g}{unit}: {_no_grid(trial)}: {_why(trial)}{place}"]
-        lines += [f"try --length {near:g}" if near else f"no length passes of those tried{usual_cause(advice.tried)}"]
+        lines += [
+            f"try --length {near:g}"
+            if near
+            else f"no length passes of those tried{usual_cause(advice.tried, advice.wall)}"
+        ]
         lines += [] if near else accepted_line(advice.tried)
     else:
         lines.append(f"try --length {length:g}")
@@ -131,10 +136,12 @@ def accepted_line(trials: list[LengthTrial]) -> list[str]:
     return [f"with --length {length:g} {option_accepting(found)} a grid without its thin limbs passes"]
 
 
-def usual_cause(trials: list[LengthTrial]) -> str:
+def usual_cause(trials: list[LengthTrial], wall: tuple[float, float] = (0.0, 0.0)) -> str:
     """Return why most lengths that were tried get no grid, as at one of them that gets none for this, and what to do.
 
     Only the faults that the table names count.
+
+    wall : how thick the thin walls of the scan are, and their share of it
     """
     causes: dict[str, list[tuple[float, str, Place | None]]] = {}
     for tried, fault in ((trial.length, trial.fault) for trial in trials if trial.fault is not None):
@@ -151,7 +158,17 @@ def usual_cause(trials: list[LengthTrial]) -> str:
     length, said, where = own[len(own) // 2]
     place = "" if where is None else f" (near {words_of_place(where)})"
     why = f"as {said}" if _are_alike(own) else f"for faults of one kind, as at {length:g}: {said}"
-    return f", {len(own)} of {len(trials)} {why}{place}; clean or crop the scan there first"
+    return f", {len(own)} of {len(trials)} {why}{place}; {_way_out_of(trials, *wall)}"
+
+
+def _way_out_of(trials: list[LengthTrial], thickness: float, share: float) -> str:
+    """Return what to do where no length passes: walls thinner than most members need shorter ones, and points for these."""
+    if share < SOME_WALL or sum(trial.length > thickness for trial in trials) <= len(trials) / 2:
+        return "clean or crop the scan there first"
+    return (
+        f"{share:.0%} of the scan is walls about {words_of_number(thickness, 2)} thick, thinner than most of these members:"
+        " scan them more densely, so that shorter ones follow both sides, or crop them away"
+    )
 
 
 def _are_alike(causes: list[tuple[float, str, Place | None]]) -> bool:
