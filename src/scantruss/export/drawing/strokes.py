@@ -55,9 +55,7 @@ class CameraView:
     camera: Camera
     corners: np.ndarray  #: (T, 3, 2) [pixel]
     middle: np.ndarray  #: (T,) nearness of the middle of each triangle [scan unit]
-    key: (
-        np.ndarray
-    )  #: (T,) the same, less where its inside is seen, and raised above that of the triangles that it hides
+    key: np.ndarray  #: (T,) the same, less where its inside is seen, raised above those of the triangles that it hides
     light: np.ndarray  #: (T,) how much light each gets, 0 to 1
     outside: np.ndarray  #: (T,) bool, whether its outside is seen
     depth: tuple[float, float]  #: nearness of the farthest and the nearest node [scan unit]
