@@ -165,7 +165,8 @@ def grid_with_notes(
         try:
             grid = grid_from_cloud(cloud, settings, progress=bars, keep_failed=keep_failed, read_seconds=read_seconds)
         except LengthError as error:
-            bars.note(f"{error}; lengths nearby are tried")
+            if not settings.length_field:
+                bars.note(f"{error}; lengths nearby are tried")
             raise LengthError(f"{error}{nearby_words(bars, cloud, settings, advice)}") from None
         except LinesError as error:
             raise LinesError(f"{error}{nearby_words(bars, cloud, settings, advice)}", error.lines) from None
