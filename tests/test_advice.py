@@ -235,6 +235,14 @@ def test_a_mesh_of_few_vertices_is_refused_with_a_way_on(
     assert words in capsys.readouterr().err
 
 
+def below_usual(advice: Advice, steps: int) -> float:
+    """Return the length so many steps of a suggestion below the usual one."""
+    length = advice._usual
+    for _ in range(steps):
+        length = advice.next_below(length)
+    return length
+
+
 def test_where_no_length_passes_the_most_frequent_cause_is_said_with_its_place() -> None:
     """Only that no length passes was said, and to clean or crop the scan, not what is wrong with it or where."""
 
@@ -546,10 +554,7 @@ def test_a_length_that_loses_ridges_gives_way_to_one_that_follows_them_below_len
 
     monkeypatch.setattr(Advice, "try_length", tried)
     advice = Advice(st.PointCloud.from_array(sheet(16, 16, 0.06)), st.Settings(length=1.0))
-    wanted = advice._usual
-    for _ in range(steps):
-        wanted = advice.next_below(wanted)
-    assert advice.suggest() == wanted
+    assert advice.suggest() == below_usual(advice, steps)
 
 
 @pytest.mark.parametrize(("idle", "steps"), [(0, 1), (1, 2), (2, 0)])
@@ -566,10 +571,7 @@ def test_a_length_that_loses_ridges_gives_way_beyond_one_that_follows_no_more_at
 
     monkeypatch.setattr(Advice, "try_length", tried)
     advice = Advice(st.PointCloud.from_array(sheet(16, 16, 0.06)), st.Settings(length=1.0))
-    wanted = advice._usual
-    for _ in range(steps):
-        wanted = advice.next_below(wanted)
-    assert advice.suggest() == wanted
+    assert advice.suggest() == below_usual(advice, steps)
 
 
 @pytest.mark.parametrize("columns", [0.0, 0.12])

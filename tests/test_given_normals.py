@@ -101,6 +101,22 @@ def test_a_few_normals_that_face_the_wrong_way_are_turned_and_walls_stay_apart()
     assert not inward[~wrong].any() and not inward[~between].any()  # between the walls points of both lie around each
 
 
+@pytest.mark.parametrize("thickness", [0.2, 0.4, 0.8])
+def test_normals_of_a_plate_thinner_than_its_spacing_are_not_turned_by_its_other_side(thickness: float) -> None:
+    """Of points drawn at random one in fifty has ten of its twelve nearest on the other side."""
+    rng = np.random.default_rng(6)
+    upper = rng.random(20_000) < 0.5
+    points = np.column_stack([rng.uniform(0.0, 100.0, (20_000, 2)), thickness * upper + rng.normal(0.0, 0.03, 20_000)])
+    normals, wrong = np.zeros((20_000, 3)), rng.choice(20_000, 20, replace=False)
+    normals[:, 2] = np.where(upper, 1.0, -1.0)
+    given = normals.copy()
+    given[wrong] *= -1.0
+    found = GivenNormals.of(points, given)
+    assert found is not None
+    inward = (found.normals * normals).sum(axis=1) < 0.0
+    assert not np.delete(inward, wrong).any()
+
+
 def test_columns_of_normals_are_read_and_follow_the_points(tmp_path: Path) -> None:
     """Those of points that are left out leave with them."""
     points = np.random.default_rng(1).random((500, 3))

@@ -151,7 +151,8 @@ def find_boundary(
         raise LengthError(f"each piece of the scan is smaller than length {settings.length:g}; use a shorter one")
     kept = _KEPT.get(samples)
     if kept is None or kept[0] != settings:
-        check_two_sided(samples.surface, samples.thickness, with_normals=samples.given is not None)
+        came_with_scan = samples.given is not None and not settings.thin_walls
+        check_two_sided(samples.surface, samples.thickness, with_normals=came_with_scan)
         if progress:
             progress("boundary", 0.4)
         filled, boundary = (_given if settings.boundary else _close_holes)(samples, settings)

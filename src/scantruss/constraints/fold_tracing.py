@@ -184,13 +184,12 @@ class Tracer:
             ):
                 folds = self._follow(sample, fold, [ridge["place"] for ridge in ridges])
                 self.watch.note(len(folds), folds["place"][-1] + self.origin)
-                parts = parts_of_fold(folds)
-                even = [
-                    each for each in parts if self._is_even(each) and (not rough or is_clear_on_rough(each, self.angle))
-                ]
-                ridges += even
-                doubtful += [each for each in parts if not any(each is part for part in even)]
-                misses = 0 if even else misses
+                for part in parts_of_fold(folds):
+                    if self._is_even(part) and (not rough or is_clear_on_rough(part, self.angle)):
+                        ridges.append(part)
+                        misses = 0
+                    else:
+                        doubtful.append(part)
                 for place in folds["place"]:
                     fresh &= ((places - place) ** 2).sum(axis=1) > (2.4 * LOOK_SPACING * self.length) ** 2
         return ridges if self.wide else ridges + self._also_ridges(ridges, doubtful)

@@ -72,9 +72,8 @@ class _Lattice(NamedTuple):
         return voxels
 
 
-_OPENED: dict[
-    tuple[bytes, float, float], OpenedBody | None
-] = {}  # by the digest of the points, the one asked for last is the last
+# by the digest of the points, their length and spacing; the one asked for last is the last
+_OPENED: dict[tuple[bytes, float, float], OpenedBody | None] = {}
 
 
 def opened_body(

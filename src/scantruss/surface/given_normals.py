@@ -16,9 +16,9 @@ NO_NORMALS = np.empty((0, 3))  # where none are given
 POINTS_TO_JUDGE = 20_000  # points by which it is judged whether normals can be trusted
 BESIDE_SINE = 0.3  # sine of the angle to its plane below which the nearest point lies beside a point, not behind it
 MOST_OPPOSITE = 0.1  # share of them that may face opposite to one beside them; of normals of either sign half do
-# nearest points that decide whether a normal is turned, how many of them must face opposite to it, and how many lie beside its point at
-# least: the other side of a thin wall lies behind it; rounds, as those that are turned decide on others
-NEAREST, MOST_OF_NEAREST, FEWEST_BESIDE, TURNING_ROUNDS = 12, 10, 3, 8
+# nearest points that decide whether a normal is turned, how many of them must face opposite to it, how far most of them may lie behind its
+# point, as the other side of a thin wall does [their distance]; rounds, as those that are turned decide on others
+NEAREST, MOST_OF_NEAREST, LEAST_BEHIND_POINT, TURNING_ROUNDS = 12, 10, 0.05, 8
 AT_A_POINT = 1e-6  # distance from a point within which a place has its normal [extent of the scan]
 
 _NORMALS_OF_CLOUDS: weakref.WeakKeyDictionary[PointCloud, GivenNormals | None] = weakref.WeakKeyDictionary()
@@ -44,7 +44,8 @@ class GivenNormals:
         given = cls(build_kd_tree(points), unit, AT_A_POINT * float(np.ptp(points, axis=0).max()))
         some = np.linspace(0, len(points) - 1, min(len(points), POINTS_TO_JUDGE)).astype(np.int64)
         other = given._nearest(points[some], 2)[0]
-        opposite = ((unit[some] * unit[other]).sum(axis=1) < 0.0) & _is_beside(points, unit, some, other)
+        beside = np.abs(_sines(points, unit, other, some)) < BESIDE_SINE
+        opposite = ((unit[some] * unit[other]).sum(axis=1) < 0.0) & beside
         if opposite.mean() > MOST_OPPOSITE:
             return None
         if opposite.any():
@@ -55,11 +56,12 @@ class GivenNormals:
         """Turn those normals of points (N, 3) that face opposite to nearly all around them."""
         unit, next_one = self.normals, self._nearest(points, 2)[0]
         for _ in range(TURNING_ROUNDS):
-            doubtful = np.flatnonzero((unit * unit[next_one]).sum(axis=1) < 0.0)
+            is_doubtful = ((unit * unit[next_one]).sum(axis=1) < 0.0) & (_sines(points, unit, next_one) > -BESIDE_SINE)
+            doubtful = np.flatnonzero(is_doubtful)
             others = np.stack([self._nearest(points[doubtful], rank)[0] for rank in range(2, NEAREST + 2)])
             opposite = ((unit[doubtful] * unit[others]).sum(axis=2) < 0.0).sum(axis=0)
-            beside = sum(_is_beside(points, unit, doubtful, other).astype(int) for other in others)
-            turned = doubtful[(opposite >= MOST_OF_NEAREST) & (beside >= FEWEST_BESIDE)]
+            behind = -np.median([_sines(points, unit, other, doubtful) for other in others], axis=0)
+            turned = doubtful[(opposite >= MOST_OF_NEAREST) & (behind < LEAST_BEHIND_POINT)]
             if not len(turned):
                 break
             unit[turned] *= -1.0
@@ -80,11 +82,11 @@ class GivenNormals:
         return which, squares
 
 
-def _is_beside(points: np.ndarray, unit: np.ndarray, which: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Return whether other points (K,) lie beside some points (K,) in the plane of their normals, not behind them."""
+def _sines(points: np.ndarray, unit: np.ndarray, other: np.ndarray, which: np.ndarray | slice = np.s_[:]) -> np.ndarray:
+    """Return the sine of the angle at which other points (K,) lie above the planes of some points (K,), or of all."""
     apart = points[other] - points[which]
-    beside: np.ndarray = np.abs((apart * unit[which]).sum(axis=1)) < BESIDE_SINE * np.linalg.norm(apart, axis=1)
-    return beside
+    sines: np.ndarray = (apart * unit[which]).sum(axis=1) / np.maximum(np.linalg.norm(apart, axis=1), 1e-300)
+    return sines
 
 
 def given_normals(cloud: PointCloud) -> GivenNormals | None:
