@@ -138,7 +138,29 @@ def test_the_wide_folds_beside_which_a_grid_fails_or_is_poor_are_given_up_alone(
 
     monkeypatch.setattr("scantruss.pipeline.make_grid", make)
     every = tuple(range(len(folds)))
-    grid, wide = with_wide_ridges(cloud, replace(attempt, wide=every), lambda grid: grid is good, None)
-    assert grid is good and made == [every, wide] and 0 not in wide and len(wide) >= len(every) - 3
-    assert with_wide_ridges(cloud, replace(attempt, wide=(0,)), lambda grid: grid is good, None) == (None, ())
-    assert with_wide_ridges(cloud, replace(attempt, wide=wide), lambda _: False, None) == (None, ())
+    grid, taken = with_wide_ridges(cloud, replace(attempt, wide=every), lambda grid: grid is good, None)
+    assert grid is good and made == [every, taken.wide] and 0 not in taken.wide and len(taken.wide) >= len(every) - 3
+    assert with_wide_ridges(cloud, replace(attempt, wide=(0,)), lambda grid: grid is good, None)[0] is None
+    made.clear()
+    assert with_wide_ridges(cloud, taken, lambda _: False, None)[0] is None and made == [taken.wide]
+
+
+def test_a_grid_that_is_poor_away_from_its_wide_folds_is_laid_out_otherwise_once(
+    cloud: PointCloud, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    settings = Settings(length=SIZE)
+    far = tuple((cloud.points.max(axis=0) + cloud.origin + 20.0 * SIZE).tolist())
+    fault = Fault("short", "has a member of 0.58 desired lengths", far)
+    grid = cast(Grid, SimpleNamespace(certificate=SimpleNamespace(warnings=(fault,))))
+    made: list[Attempt] = []
+
+    def make(_: PointCloud, tried: Attempt, **__: object) -> Grid:
+        made.append(tried)
+        return grid
+
+    monkeypatch.setattr("scantruss.pipeline.make_grid", make)
+    attempt = Attempt(settings, wide=(0,))
+    found, taken = with_wide_ridges(cloud, attempt, lambda _: len(made) == 2, None)
+    assert found is grid and made == [attempt, taken] and taken.wide == (0,) and taken.starts is not None
+    made.clear()
+    assert with_wide_ridges(cloud, attempt, lambda _: False, None)[0] is None and len(made) == 2

@@ -184,33 +184,37 @@ def make_grid_with_wide_ridges(cloud: PointCloud, attempt: Attempt, *, progress:
     # the last alone where some are the same
     tried = {every: follows_better, edges: follows_ridges_as_well, made: follows_ridges_as_well}
     for wide, is_taken in tried.items():
-        asked = replace(first, wide=wide)
-        folded, wide_taken = (
-            with_wide_ridges(cloud, asked, partial(is_taken, other=plain), seen) if wide else (None, ())
-        )
+        if not wide:
+            continue
+        folded, taken = with_wide_ridges(cloud, replace(first, wide=wide), partial(is_taken, other=plain), seen)
         if folded is not None:
             with suppress(FrontError):
-                return make_grid(cloud, replace(attempt, wide=wide_taken), progress=progress) if is_long else folded
+                return (
+                    make_grid(cloud, replace(taken, settings=attempt.settings), progress=progress)
+                    if is_long
+                    else folded
+                )
     return make_grid(cloud, attempt, progress=progress) if is_long else plain
 
 
 def with_wide_ridges(
     cloud: PointCloud, attempt: Attempt, is_taken: Callable[[Grid], bool], progress: Progress | None
-) -> tuple[Grid | None, tuple[int, ...]]:
-    """Return the grid with ridges along wide folds if it is taken, and which folds; else once without those beside which it is poor."""
-    tried: Attempt | None = attempt
+) -> tuple[Grid | None, Attempt]:
+    """Return the grid with ridges along wide folds if it is taken, and its attempt; one more attempt is made where it is poor."""
+    following: Attempt | None = attempt
     for _ in range(2):
-        if tried is None:
+        if following is None:
             break
+        attempt = following
         try:
-            grid = make_grid(cloud, tried, progress=progress)
+            grid = make_grid(cloud, attempt, progress=progress)
             if is_taken(grid):
-                return grid, tried.wide
+                return grid, attempt
             places = places_of_poor_members(grid)
         except FrontError as fault:
             places = places_of_fault(fault)
-        tried = tried.without_wide(places, cloud)
-    return None, ()
+        following = attempt.after_poor(places, cloud)
+    return None, attempt
 
 
 def _unseen(progress: Progress | None) -> Progress | None:

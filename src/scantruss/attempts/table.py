@@ -21,7 +21,7 @@ from .limit import FAR_MISSING, only_leaves_out
 from .looks import ROUGH_SCAN, VERY_ROUGH_SCAN, AskedScan, has_one_lattice
 
 if TYPE_CHECKING:
-    from ..errors import ScanTrussError
+    from ..errors import Place, ScanTrussError
     from ..grid.certificate import Certificate
     from ..scan.cloud import PointCloud
     from ..settings import Settings
@@ -68,16 +68,22 @@ class Attempt:
         later = replace(self, faults=self.faults + new)
         return later if new and later.ridge_points(cloud) < followed else None
 
-    def without_wide(self, faults: Sequence[tuple[float, float, float]], cloud: PointCloud) -> Attempt | None:
-        """The same attempt without the wide fold beside each of some places [scan unit]; None where that is none, or all."""
+    def after_poor(self, places: Sequence[Place], cloud: PointCloud) -> Attempt | None:
+        """The same attempt without the wide fold beside each of some poor places [scan unit]; None where it can be no better.
+
+        Where none is beside any of them, they are chance: its front is laid out otherwise, once.
+        """
         samples, settings = self._samples(cloud)
-        own, places = list(self.wide), np.reshape(faults, (-1, 1, 3)) - samples.origin
+        own, at = list(self.wide), np.reshape(places, (-1, 1, 3)) - samples.origin
         folds = wide_folds(samples, settings)
         # distance of each fold from each place
-        away = np.array([np.linalg.norm(places - folds[number], axis=2).min(axis=1) for number in own])
+        away = np.array([np.linalg.norm(at - folds[number], axis=2).min(axis=1) for number in own])
         beside = {own[fold] for fold in away.argmin(axis=0)[away.min(axis=0) < FAULT_REACH * settings.length]}
+        if not beside:
+            can_turn = len(places) > 0 and self.starts is None
+            return replace(self, starts=layouts_of(self.settings)[SECOND_LAYOUT][0]) if can_turn else None
         kept = tuple(number for number in own if number not in beside)
-        return replace(self, wide=kept) if kept and kept != self.wide else None
+        return replace(self, wide=kept) if kept else None
 
     def ridge_points(self, cloud: PointCloud) -> int:
         """Return by how many points the ridges go that this attempt follows."""
