@@ -333,7 +333,7 @@ def test_a_grid_with_ridges_is_searched_on_and_is_in_no_figure_worse() -> None:
     improved = candidates.improve_fronts(fronts, samples, boundary, constraints, settings)
     best = candidates.chosen(candidates.those_that_pass(improved, samples, boundary, constraints, settings))
     usual = grid_of_candidate(best)
-    search_on(best, samples, boundary, constraints, settings, usual.quality.shape_mean)
+    search_on(best, samples, boundary, constraints, settings, known(best.judged))
     even = grid_of_candidate(best)
     theirs, found = (known(known(grid.certificate).scan_distance) for grid in (usual, even))
     assert len(even.lines) > 0 and known(even.certificate).passed
@@ -377,7 +377,7 @@ def test_a_longer_search_spares_the_places_of_its_faults_and_begins_again_from_i
 
     monkeypatch.setattr("scantruss.improve.longer_search.searched_again", searched)
     monkeypatch.setattr("scantruss.improve.longer_search.judged", check)
-    search_on(best, *steps, settings, 0.0)
+    search_on(best, *steps, settings, known(best.judged))
     sparing = begun[FREE_TURNS:]
     assert len({nodes for nodes, _ in sparing}) == 1
     assert [spared for _, spared in sparing] == [[k, 0] for k in range(SPARING_TURNS)]

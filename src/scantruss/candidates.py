@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
 FULLY_IMPROVED = {"quick": 1, "normal": 1, "best": 3}  # fronts that are improved to the end
 FINALIST_BATCHES = 2  # times that finalists are tried
+LONGER_SEARCHES = 4  # longer searches of effort `best`, of which the most even grid is taken
+NODES_OF_SEVERAL_SEARCHES = 3000  # nodes of a grid above which there is one only
 
 
 def advance_fronts(
@@ -201,14 +203,44 @@ def no_worse(
     fronts = advance_fronts(samples, boundary, constraints, fields, lower)
     improved = improve_fronts(fronts, samples, boundary, constraints, lower)
     usual = chosen(those_that_pass(improved, samples, boundary, constraints, lower))
-    better, least_shape = [], grid_of(usual).quality.shape_mean
+    passed: list[Candidate] = []
     with suppress(FrontError):
         passed = those_that_pass(candidates, samples, boundary, constraints, settings, progress=progress)
-        better = [each for each in passed if is_no_worse(grid_of(each), grid_of(usual))]
+    better = [each for each in passed if is_no_worse(grid_of(each), grid_of(usual))]
     best = chosen(better) if better else usual
     if best.mesh.sharp.any() or not better:  # elsewhere its own search leaves little
-        search_on(best, samples, boundary, constraints, lower, least_shape)
+        best = searched_on(best, usual, passed, samples, boundary, constraints, lower)
     return grid_of(best).replace(settings=settings)
+
+
+def searched_on(
+    best: Candidate,
+    usual: Candidate,
+    passed: Sequence[Candidate],
+    samples: SurfaceSamples,
+    boundary: Boundary,
+    constraints: Constraints,
+    settings: Settings,
+) -> Candidate:
+    """Return the most even candidate after longer searches of several, that is in no figure worse than the usual one.
+
+    How even the grid of a search is depends on where it begins and on chance.
+    """
+    least = usual.judged
+    assert least is not None
+    begun = [usual, *passed][:LONGER_SEARCHES]
+    begun += [usual.copy() for _ in range(LONGER_SEARCHES - len(begun))]
+    if len(grid_of(usual).nodes) > NODES_OF_SEVERAL_SEARCHES:
+        begun = [best]
+
+    def search(number: int) -> None:
+        search_on(begun[number], samples, boundary, constraints, settings, least, number)
+
+    threaded_map(search, range(len(begun)), None)
+    fit = [each for each in begun if is_no_worse(grid_of(each), least.checked_grid)]
+    if not best.mesh.sharp.any():
+        return chosen(fit)
+    return min(fit, key=lambda each: grid_of(each).quality.length_cv)
 
 
 def optimize_fronts(

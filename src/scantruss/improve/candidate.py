@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from ..check.certify import Judged, judge
@@ -55,6 +55,10 @@ class Candidate:
             return self.energy
         distance = getattr(found.scan_distance, quantile) / self.settings.length
         return self.energy + MISSING_ENERGY * found.missing + distance_energy * float(distance)
+
+    def copy(self) -> Candidate:
+        """Return the same candidate with a mesh of its own."""
+        return replace(self, mesh=self.mesh.copy())
 
     def take(self, judged: Judged) -> None:
         """Take a grid that was judged."""

@@ -40,53 +40,53 @@ def search_on(
     boundary: Boundary,
     constraints: Constraints,
     settings: Settings,
-    least_shape: float,
+    usual: Judged,
+    number: int = 0,
 ) -> None:
-    """Search a grid that passes again and again, and take the most even one that is as near to the scan and as regular as asked for.
+    """Search a grid that passes again and again, and take the most even one that is as near to the scan and as regular as the usual one.
 
-    The first turns go on from each other, whatever comes of them. Then it is searched on from the grid taken: a turn that ends in a fault
-    or farther from the scan is taken back, and the places where it went wrong are spared from then on. Most of them are tips, limbs and
+    A turn that ends in a fault is taken back, and the places where it went wrong are spared from then on. Most of them are tips, limbs and
     clefts about a member wide, which hold up all the rest. Where a spared place fails again, as its nodes still settle, they stay where
-    they are.
+    they are. After the free turns it is searched on from the grid taken; a turn that ends farther from the scan is taken back, too.
 
-    least_shape : mean shape quality below which no grid is taken
+    usual : the grid of effort `normal`
+    number : of this search, each of which makes other random moves
     """
-    mesh, first, usual = candidate.mesh, candidate.judged, grid_of(candidate)
-    assert first is not None
-    kept, off, faulty, lost, held = mesh.copied(), _distances_off(usual, samples), _NOWHERE, _NOWHERE, _NOWHERE
+    mesh, first, begun, least = candidate.mesh, candidate.judged, grid_of(candidate), usual.checked_grid
+    off, faulty, lost, held = _distances_off(begun, samples), _NOWHERE, _NOWHERE, _NOWHERE
+    taken = last = mesh.copied()
+    most = begun.quality.length_cv - LEAST_EVENED if is_no_worse(begun, least) else least.quality.length_cv
     for turn in range(FREE_TURNS + SPARING_TURNS):
-        is_sparing = turn >= FREE_TURNS
+        is_free = turn < FREE_TURNS
         if turn == FREE_TURNS:
-            mesh.restore(kept)
+            mesh.restore(taken)
+            last = taken
         spared = Spared(faulty, SPARED_AT_FAULT * mesh.length), Spared(lost, SPARED_AT_LOSS * mesh.length)
-        number = turn - FREE_TURNS + 1 if is_sparing else 0
+        chance = number * (FREE_TURNS + SPARING_TURNS) + (0 if is_free else turn - FREE_TURNS + 1)
         with _at_rest(mesh.net, ~Spared(held, spared[0].reach).away(mesh.net.nodes)):
             grid = searched_again(
-                mesh, candidate.front, samples, constraints, candidate.settings, LONGER, spared, number
+                mesh, candidate.front, samples, constraints, candidate.settings, LONGER, spared, chance
             )
         now = judged(grid, samples, boundary, settings)
-        grid = now.checked_grid
-        if now.certificate.passed and is_as_near(grid, usual):
-            evener = grid.quality.length_cv < grid_of(candidate).quality.length_cv
-            taken = evener and grid.quality.shape_mean >= least_shape and _is_no_poorer(now, first)
-            if taken:
-                candidate.take(now)
-            if taken or is_sparing:
-                kept = mesh.copied()
-        elif is_sparing:
-            mesh.restore(kept)
-            wrong = [place for fault in now.certificate.faults for place in (fault.where, *fault.also) if place]
-            if wrong:
-                places = np.array(wrong) - samples.origin
-                held = np.concatenate([held, places[~spared[0].away(places)]])
-                faulty = np.concatenate([faulty, places])
-            else:
-                away = _distances_off(grid, samples)
-                is_lost = (away > off + LEAST_FARTHER) & (away > np.quantile(off, FAR_PLACES))
-                lost = np.concatenate([lost, _places(samples)[is_lost]])
-    if usual.quality.length_cv - grid_of(candidate).quality.length_cv < LEAST_EVENED:
-        candidate.judged, candidate.grid = first, usual
-    else:
+        grid, passes = now.checked_grid, now.certificate.passed
+        is_near = passes and is_as_near(grid, least)
+        if is_near and grid.quality.length_cv < most and _is_no_poorer(now, usual):
+            candidate.take(now)
+            most, taken = grid.quality.length_cv, mesh.copied()
+        if passes and (is_near or is_free):
+            last = mesh.copied()
+            continue
+        mesh.restore(last)
+        wrong = [place for fault in now.certificate.faults for place in (fault.where, *fault.also) if place]
+        if wrong:
+            places = np.array(wrong) - samples.origin
+            held = np.concatenate([held, places[~spared[0].away(places)]])
+            faulty = np.concatenate([faulty, places])
+        elif passes:
+            away = _distances_off(grid, samples)
+            is_lost = (away > off + LEAST_FARTHER) & (away > np.quantile(off, FAR_PLACES))
+            lost = np.concatenate([lost, _places(samples)[is_lost]])
+    if candidate.judged is not first:
         candidate.end()
 
 
@@ -102,10 +102,11 @@ def _at_rest(net: Net, which: np.ndarray) -> Iterator[None]:
         net.kind[moving] = kinds
 
 
-def _is_no_poorer(now: Judged, first: Judged) -> bool:
-    """Whether the worst triangle of a grid is hardly worse than that of the first one, and it has no more warnings."""
-    as_few = len(now.certificate.warnings) <= len(first.certificate.warnings)
-    return as_few and now.grid.quality.shape_min >= LEAST_OF_WORST * first.grid.quality.shape_min
+def _is_no_poorer(now: Judged, usual: Judged) -> bool:
+    """Whether a grid is as regular as the usual one, its worst triangle hardly worse, and it has no more warnings."""
+    as_few = len(now.certificate.warnings) <= len(usual.certificate.warnings)
+    found, least = now.grid.quality, usual.grid.quality
+    return as_few and found.shape_mean >= least.shape_mean and found.shape_min >= LEAST_OF_WORST * least.shape_min
 
 
 def is_as_near(grid: Grid, other: Grid) -> bool:

@@ -48,7 +48,7 @@ PERTURBATIONS = {  # for each effort, and for the search after it
     "quick": Annealing(0, 0.0),
     "normal": Annealing(6, 0.0),
     "best": Annealing(40, 0.2),
-    LONGER: Annealing(8, 0.2),
+    LONGER: Annealing(8, 0.4),
 }
 NODES_OF_LARGE_GRID = 700  # nodes above which `normal` perturbs once, in parts: there the boundary matters little
 MOST_PARTITIONS = 2  # most times that a large grid is perturbed in parts

@@ -24,7 +24,7 @@ from .sliding_nodes import find_on_lines, inner_lines, joined
 
 NEAR_IN_THE_END = 0.25  # largest distance of a node from the centre of its patch in the end [member lengths]
 LENGTH_WEIGHT = 1.0  # weight of the lengths of members against the shapes of triangles
-WEIGHT_OF_LONGER_SEARCH = 3.0  # the same in the longer search of a grid that passes
+WEIGHT_OF_LONGER_SEARCH = 8.0  # the same in the longer search of a grid that passes
 FOLDS_OF_LONGER_SEARCH = 0.2  # weight of the distances from folds there
 NODES_PER_THREAD = 300  # fewest nodes worth a thread of their own
 PROJECTION_PARTS = 3  # parts per thread in projection, as nodes at the boundary take less time
@@ -270,6 +270,18 @@ class WorkingMesh:
         self.renew(0.05)
         point_location.distances_from_scan(self.net, self.patches, values)
         return values
+
+    def copy(self) -> WorkingMesh:
+        """The same mesh, which can be changed beside this one."""
+        own = self.copied()
+        return replace(
+            self,
+            net=own.net,
+            surface=with_own_scratch(self.surface),
+            patches=own.patches,
+            fixed=own.fixed,
+            projection_distance=own.projection_distance,
+        )
 
     def copied(self) -> Kept:
         """A copy of what trials change."""
