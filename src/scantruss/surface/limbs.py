@@ -39,6 +39,7 @@ BLUNT_END = 2.0  # least area of an end that is wider than a member [desired len
 SURE_GIRTH = 0.95  # girth at the thinnest twentieth of a limb above which it is not cut off [girth below which limbs are cut off]
 BLUNT_GIRTH = 0.5  # the same of what is the end of a limb that stays
 BLUNT_NORMAL = 0.4  # mean normal above which it is such an end; half a ball has 0.5, a tube 0
+HEIGHT_OF_PEAK = 0.6  # height up to which such an end is a peak of the body and stays [desired lengths]
 CLEAN_RING_SHARE = 0.8  # least share of the samples on each side of a ring that are on the right side
 NECK_GIRTH = 0.8  # girth down to which a neck before such an end stays [girth below which limbs are cut off]
 LOOKED_AROUND_RING = 0.4  # how far a ring is looked around for, beside its own radius [desired lengths]
@@ -211,7 +212,10 @@ class _Parts:
         rings: list[LimbRing] = []
         for limb in np.unique(whole[~stays]):
             gone = whole == limb
-            blunt = np.linalg.norm(self.surface.normals[gone].mean(axis=0)) > BLUNT_NORMAL
+            ahead = self.surface.normals[gone].mean(axis=0)
+            blunt = np.linalg.norm(ahead) > BLUNT_NORMAL
+            if blunt and self._height(gone, ahead) < HEIGHT_OF_PEAK:
+                continue
             if self._thinnest(gone & self.thin) > (BLUNT_GIRTH if blunt else SURE_GIRTH) * self.limit:
                 continue
             off = gone[self.owner]
@@ -284,6 +288,11 @@ class _Parts:
         """Return the girth at the thinnest twentieth of some samples (S,) bool [desired lengths]."""
         known = self.girth[which & np.isfinite(self.girth)]
         return float(np.quantile(known, 0.05)) if len(known) else 0.0
+
+    def _height(self, which: np.ndarray, ahead: np.ndarray) -> float:
+        """Return how far some samples (S,) bool reach along a direction (3,) [desired lengths]."""
+        along = self.surface.mean[which] @ ahead / np.linalg.norm(ahead)
+        return float(np.ptp(along)) / (self.surface.length * float(self.surface.field[which].mean()))
 
     def _groups(self, thin: np.ndarray, fat: np.ndarray) -> list[np.ndarray]:
         """Return the thin samples at each place where a part that is cut off joins one that stays; of the links (L,) between these."""
