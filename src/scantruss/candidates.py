@@ -12,7 +12,7 @@ from .errors import CertificateError, FrontError
 from .front.advance import advance_front
 from .front.orientation_field import Field, FieldStart, orientation_fields
 from .improve.candidate import Candidate, grid_of, judged, misses_at_most
-from .improve.longer_search import is_no_worse, search_on
+from .improve.longer_search import is_no_worse, search_on, unevenness
 from .improve.optimize import improve_first, improve_last
 from .improve.tip_search import MOST_MISSED, reach_tips_of
 from .runtime.parallel import threaded_map
@@ -240,7 +240,7 @@ def searched_on(
     fit = [each for each in begun if is_no_worse(grid_of(each), least.checked_grid)]
     if not best.mesh.sharp.any():
         return chosen(fit)
-    return min(fit, key=lambda each: grid_of(each).quality.length_cv)
+    return min(fit, key=lambda each: unevenness(grid_of(each), settings.length))
 
 
 def optimize_fronts(

@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from ..surface.samples import SurfaceSamples
 
 FREE_TURNS, SPARING_TURNS = 18, 18  # times that a grid is searched again, and again where places are spared
-LEAST_EVENED = 0.001  # fall of the variation of the lengths that is worth another grid
+LEAST_EVENED = 0.001  # fall of `unevenness` that is worth another grid
+FAR_UNEVENNESS = 0.1  # share of the distance at 99 % that counts as uneven [1 / member length]
 MISSED_MORE = 0.002  # share of the scan that the grid of a longer search may miss beyond that of a shorter one
 LEAST_FARTHER = 0.05  # by how much farther from the grid than before a place of the scan is lost [member lengths]
 # distance from a fault, and from a place that was lost, within which no later turn begins [member lengths]
@@ -55,7 +56,7 @@ def search_on(
     mesh, first, begun, least = candidate.mesh, candidate.judged, grid_of(candidate), usual.checked_grid
     off, faulty, lost, held = _distances_off(begun, samples), _NOWHERE, _NOWHERE, _NOWHERE
     taken = last = mesh.copied()
-    most = begun.quality.length_cv - LEAST_EVENED if is_no_worse(begun, least) else least.quality.length_cv
+    most = unevenness(begun, mesh.length) - LEAST_EVENED if is_no_worse(begun, least) else np.inf
     for turn in range(FREE_TURNS + SPARING_TURNS):
         is_free = turn < FREE_TURNS
         if turn == FREE_TURNS:
@@ -70,9 +71,9 @@ def search_on(
         now = judged(grid, samples, boundary, settings)
         grid, passes = now.checked_grid, now.certificate.passed
         is_near = passes and is_as_near(grid, least)
-        if is_near and grid.quality.length_cv < most and _is_no_poorer(now, usual):
+        if is_near and unevenness(grid, mesh.length) < most and _is_no_poorer(now, usual):
             candidate.take(now)
-            most, taken = grid.quality.length_cv, mesh.copied()
+            most, taken = unevenness(grid, mesh.length), mesh.copied()
         if passes and (is_near or is_free):
             last = mesh.copied()
             continue
@@ -103,10 +104,18 @@ def _at_rest(net: Net, which: np.ndarray) -> Iterator[None]:
 
 
 def _is_no_poorer(now: Judged, usual: Judged) -> bool:
-    """Whether a grid is as regular as the usual one, its worst triangle hardly worse, and it has no more warnings."""
+    """Whether a grid is as even and regular as the usual one, its worst triangle hardly worse, and it has no more warnings."""
     as_few = len(now.certificate.warnings) <= len(usual.certificate.warnings)
     found, least = now.grid.quality, usual.grid.quality
-    return as_few and found.shape_mean >= least.shape_mean and found.shape_min >= LEAST_OF_WORST * least.shape_min
+    as_even = found.length_cv <= least.length_cv and found.shape_mean >= least.shape_mean
+    return as_few and as_even and found.shape_min >= LEAST_OF_WORST * least.shape_min
+
+
+def unevenness(grid: Grid, length: float) -> float:
+    """Return the variation of the lengths, and a share of the distance of the scan from a grid at 99 %: of grids as even the nearer."""
+    found = grid.certificate
+    away = found.scan_distance.p99 / length if found is not None and found.scan_distance is not None else 0.0
+    return grid.quality.length_cv + FAR_UNEVENNESS * float(away)
 
 
 def is_as_near(grid: Grid, other: Grid) -> bool:
