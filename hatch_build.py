@@ -25,6 +25,8 @@ COMMANDS = (
     "grid shell.npy shell.obj shell.json --length 1",
     "structure shell.json structure.json --unit m --supports boundary --path worst --path-steps 1",
     "grid shell.npy quads.obj --length 1 --cells quad",
+    "grid shell.npy paper.obj --length 1 --method paper",
+    "grid shell.npy field.obj --length curvature:0.8:1.5",
     "clean shell.npy clean.ply",
     "thin clean.ply -o thin.ply --spacing 0.2",
 )

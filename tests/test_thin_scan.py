@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 import pytest
 from scan_files import axes, e57, las, pcd, plate, text, written
-from test_bad_input import BROKEN
 from test_bad_input import FILES as WHOLE
+from test_bad_input import NAMES, broken
 from test_scan_units import FOOT, GEOGRAPHIC, HEIGHT, METRE, SURVEY, plane, wkt, woods
 from test_selection import CASES, CLASS, COUNT, FILES, HOLE, NUMBER, RING
 
@@ -203,9 +203,9 @@ def test_count_lines_of_several_scans_in_a_text_are_kept() -> None:
             thin_scan("a.pts", S, workers=crew)
 
 
-@pytest.mark.parametrize("name", sorted(set(BROKEN).difference(FEW)))
+@pytest.mark.parametrize("name", sorted(set(NAMES).difference(FEW)))
 def test_a_broken_file_is_refused_in_one_line(name: str) -> None:
-    Path(name).write_bytes(BROKEN[name])
+    Path(name).write_bytes(broken(name))
     with pytest.raises(ScanTrussError) as caught:
         thin_scan(name, S)
     assert "\n" not in str(caught.value) and (name in str(caught.value) or "points" in str(caught.value))
