@@ -25,6 +25,7 @@ from .gaps import bridged_gaps, openings_closed
 from .handles import false_struts
 from .hanging import hanging_nodes, nodes_off_sheets
 from .irregular import count_irregular
+from .joined import parts_joined
 from .left_out import asked_for, closed_holes, first_and_more, parts_left_out, without_caps
 from .limits import COVER_REACH, limits_of, mostly_rounded, places_to_look_at, widened_limits
 from .missed import farthest_followed, largest_patch_missed, points_missed, shares_rounded
@@ -119,6 +120,7 @@ class Judged:
         slits, narrow, parts = narrow_gaps(grid, samples, feet, found, [*closed, *gaps], length)
         bridged = [each for each in bridged if each.kind == "bridged" or not each.is_said_by(parts)]
         holes = [*closed, *first_and_more([*(gap for gap in gaps if gap not in parts), *slits])]
+        joined = parts_joined(grid, samples, length, [*bridged, *narrow])
         lids = openings_closed(holes, [*bridged, *narrow], samples, length, grid.unit)
         crushed = crushed_parts(grid, samples, found, length)
         too_frayed = frayed(crushed, found, followed, members)
@@ -143,6 +145,7 @@ class Judged:
                 *lids,
                 *(each for each in bridged if each.kind == "gap"),
                 *narrow,
+                *joined,
                 *beside,
                 *peaks,
                 *crushed,

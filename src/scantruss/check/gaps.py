@@ -41,7 +41,7 @@ POINTS_AROUND_MIDDLE = 60
 SECTORS_OF_RING, LEAST_OF_TWO = 6, 7
 PLACES_ACROSS_GAP = np.stack(np.meshgrid(*[np.linspace(-0.6, 0.6, 7)] * 2), axis=-1).reshape(
     -1, 2
-)  # places around another [reach]
+)  # places around another [its arms]
 MOST_BRIDGED = 1.2  # width of a gap that is open there from which on a grid that bridges it fails [member lengths]
 OPEN_FROM = 0.1  # distance of the boundary from the nearest point from which on a gap there is open [member lengths]
 WIDE_OPENING = 0.5  # longest side from which on an opening that is closed is said [member lengths]
@@ -183,9 +183,11 @@ def is_empty_within(curve: np.ndarray, points: np.ndarray, edge: np.ndarray | No
     points : (N, 3) by ascending x; edge : as of `is_sparse_beside`, which is asked too where it is given.
     """
     middle = curve.mean(axis=0)
-    normal = np.linalg.svd(curve - middle)[2][2]
+    along, across, normal = np.linalg.svd(curve - middle)[2]
     reach = float(np.linalg.norm(curve - middle, axis=1).max())
-    place = _emptiest(middle, normal, reach, points)  # a curve of few samples is not around the middle of its hole
+    # a curve of few samples is not around the middle of its hole; one along an edge is narrow, and beside it is air
+    half = np.array([reach, np.abs((curve - middle) @ across).max()])
+    place = _emptiest(middle, half[:, None] * np.stack([along, across]), reach, points)
     away = float(np.linalg.norm(points_within(place, reach, points) - place, axis=1).min(initial=reach))
     radius = empty_disc(place, normal, away, points)
     return radius > 0.0 and (edge is None or not is_sparse_beside(place, normal, radius, points, edge))
@@ -222,11 +224,10 @@ def points_within(place: np.ndarray, reach: float, points: np.ndarray) -> np.nda
     return near
 
 
-def _emptiest(middle: np.ndarray, normal: np.ndarray, reach: float, points: np.ndarray) -> np.ndarray:
-    """Return the place (3,) in the plane around another that is farthest from all points (N, 3) by ascending x."""
-    axes = np.linalg.svd(normal[None])[2][1:]
+def _emptiest(middle: np.ndarray, arms: np.ndarray, reach: float, points: np.ndarray) -> np.ndarray:
+    """Return the place (3,) around another, by arms (2, 3) of a reach at most, that is farthest from all points (N, 3) by ascending x."""
     around = points_within(middle, 2.0 * reach, points)
-    places: np.ndarray = middle + reach * PLACES_ACROSS_GAP @ axes
+    places: np.ndarray = middle + PLACES_ACROSS_GAP @ arms
     away = [np.linalg.norm(around - place, axis=1).min(initial=reach) for place in places]
     return places[int(np.argmax(away))]
 
