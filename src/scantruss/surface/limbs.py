@@ -39,7 +39,7 @@ BLUNT_END = 2.0  # least area of an end that is wider than a member [desired len
 SURE_GIRTH = 0.95  # girth at the thinnest twentieth of a limb above which it is not cut off [girth below which limbs are cut off]
 BLUNT_GIRTH = 0.5  # the same of what is the end of a limb that stays
 BLUNT_NORMAL = 0.4  # mean normal above which it is such an end; half a ball has 0.5, a tube 0
-HEIGHT_OF_PEAK = 0.6  # height up to which such an end is a peak of the body and stays [desired lengths]
+BLUNT_HEIGHT = 0.6  # height up to which such an end is a peak of the body and stays [desired lengths]
 CLEAN_RING_SHARE = 0.8  # least share of the samples on each side of a ring that are on the right side
 NECK_GIRTH = 0.8  # girth down to which a neck before such an end stays [girth below which limbs are cut off]
 LOOKED_AROUND_RING = 0.4  # how far a ring is looked around for, beside its own radius [desired lengths]
@@ -214,7 +214,7 @@ class _Parts:
             gone = whole == limb
             ahead = self.surface.normals[gone].mean(axis=0)
             blunt = np.linalg.norm(ahead) > BLUNT_NORMAL
-            if blunt and self._height(gone, ahead) < HEIGHT_OF_PEAK:
+            if blunt and self._height(gone, ahead) < BLUNT_HEIGHT:
                 continue
             if self._thinnest(gone & self.thin) > (BLUNT_GIRTH if blunt else SURE_GIRTH) * self.limit:
                 continue
