@@ -171,7 +171,13 @@ def with_ridges_given_up(grid: Grid, parts: Sequence[np.ndarray]) -> Grid:
 
 def with_ridges_lost(grid: Grid, parts: Sequence[np.ndarray]) -> Grid:
     """Return a grid with a warning of the parts of folds that it cuts across, as `with_ridges_given_up`."""
-    return _with_ridges(grid, parts, "cuts across ridges of the scan", "lost", "; shorter members or a smaller --ridge-angle may follow them")
+    return _with_ridges(
+        grid,
+        parts,
+        "cuts across ridges of the scan",
+        "lost",
+        "; shorter members or a smaller --ridge-angle may follow them",
+    )
 
 
 def _with_ridges(grid: Grid, parts: Sequence[np.ndarray], said: str, kind: str = "ridge", advice: str = "") -> Grid:
