@@ -52,7 +52,7 @@ def girth_at(x: np.ndarray, girth: float, tip: float) -> np.ndarray:
 
 
 def samples_of(points: np.ndarray, **settings: float) -> SurfaceSamples:
-    return sample_surface(st.PointCloud.from_array(points), st.Settings(length=1.0, **settings))  # type: ignore[arg-type]
+    return sample_surface(st.PointCloud.from_array(points), st.Settings(**{"length": 1.0} | settings))  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(("tip", "is_cut"), [(4.0, False), (1.2, True)])
@@ -87,6 +87,23 @@ def test_a_limb_of_three_members_round_is_kept_to_its_blunt_end(girth: float, ti
     assert certificate.passed and certificate.missing < 0.002 and known(grid.settings).limb_girth == 3.0
     assert (grid.topology.components, grid.topology.boundary_loops, grid.topology.euler) == (1, 0, 2)
     assert grid.scan_nodes[:, 0].max() > TIP - 0.6
+
+
+@pytest.mark.parametrize("length", [0.6, 0.88, 1.23])
+def test_the_peak_of_a_tent_is_no_limb(length: float) -> None:
+    """Its masts are as steep as 67 degrees, so that no three members go around it for the last one."""
+    draw = np.random.default_rng(15)
+    x, y, drawn = draw.uniform([-7.0, -4.0, 0.0], [7.0, 4.0, 2.6], (60_000, 3)).T
+    rise = 5.2 * np.exp(-np.hypot(np.abs(x) - 3.5, y) / 2.2)
+    even = drawn < np.sqrt(1.0 + (rise / 2.2) ** 2)
+    points = np.column_stack([x, y, rise])[even]
+    assert not samples_of(points, length=length).rings
+    grid = st.grid_from_points(points, st.Settings(length=length))
+    certificate = known(grid.certificate)
+    assert certificate.passed and not [part for part in certificate.left_out if part.kind == "limbs"]
+    for side in (-1.0, 1.0):
+        near = np.hypot(grid.scan_nodes[:, 0] - 3.5 * side, grid.scan_nodes[:, 1]) < length
+        assert grid.scan_nodes[near, 2].max() > points[side * points[:, 0] > 0.0, 2].max() - 0.35 * length
 
 
 @pytest.mark.parametrize("cut_thin", ["close", "open"])
