@@ -9,6 +9,8 @@ import numpy as np
 from ..errors import words_of_number
 from ..grid.certificate import Fault, place_of
 from ..kernels.geometry.components import component_labels
+from ..scan.vectors import dots
+from ..surface.owners import owners_of
 from .left_out import points_together
 from .limits import PLACES_KEPT
 
@@ -21,7 +23,7 @@ if TYPE_CHECKING:
     from ..surface.samples import SurfaceSamples
 
 CLOSEST_POINTS = 0.05  # distance to which the points of denser scans are thinned [member lengths]
-# least sine of the angle between a member and the scan at one of its ends: others lie on one surface
+# least sine of the angle between a member and the scan, in the mean of its ends: others lie on one surface
 LEAST_SLOPE = 0.1
 # step from point to point, each nearer to the other end of a member, by which nearly all members of one surface are crossed
 STEP_OF_WALK, NEIGHBORS_OF_WALK, STEPS_OF_WALK = 1.5, 16, 60  # [spacings of the points]
@@ -53,13 +55,11 @@ def parts_joined(grid: Grid, samples: SurfaceSamples, length: float, said: Seque
     length : desired member length [scan unit]
     said : warnings of gaps; what lies within a member of their places is not said again
     """
-    if samples.moved:
+    ends = np.empty((0, 2), np.int64) if samples.moved else _steep_members(grid, samples)
+    if not len(ends):
         return []
     from scipy.spatial import cKDTree  # which grids without steep members do not load
 
-    ends = _steep_members(grid, samples)
-    if not len(ends):
-        return []
     points = _thinned(samples.measured_points, samples.spacing, CLOSEST_POINTS * length)
     tree = cKDTree(points)
     step = STEP_OF_WALK * max(samples.spacing, CLOSEST_POINTS * length)
@@ -87,14 +87,14 @@ def parts_joined(grid: Grid, samples: SurfaceSamples, length: float, said: Seque
 
 
 def _steep_members(grid: Grid, samples: SurfaceSamples) -> np.ndarray:
-    """Return the members inside a grid (K, 2) that lead off the scan at one of their ends."""
-    from scipy.spatial import cKDTree
-
+    """Return the members inside a grid (K, 2) that lead off the scan, in the mean of their ends."""
     ends = grid.edges[grid.edge_triangles[:, 1] >= 0]
-    normals = samples.surface.normals[cKDTree(samples.surface.mean).query(grid.nodes)[1]]
+    owner = owners_of(samples, grid.nodes)
     ahead = grid.nodes[ends[:, 1]] - grid.nodes[ends[:, 0]]
-    off = np.abs(np.einsum("kx,kex->ke", ahead, normals[ends])).max(axis=1)
-    return ends[off > LEAST_SLOPE * np.linalg.norm(ahead, axis=1)]
+    one, two = (samples.surface.normals[owner[ends[:, k]]] for k in (0, 1))
+    alike = np.where(dots(one, two) < 0.0, -1.0, 1.0)[:, None]  # a bend leads off to either side, a step to one
+    along = np.abs(dots(ahead, 0.5 * (one + alike * two)))
+    return ends[(along > LEAST_SLOPE * np.linalg.norm(ahead, axis=1)) | (owner[ends] < 0).any(axis=1)]
 
 
 def _thinned(points: np.ndarray, spacing: float, apart: float) -> np.ndarray:
