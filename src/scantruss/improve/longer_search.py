@@ -54,6 +54,7 @@ def search_on(
     number : of this search, each of which makes other random moves
     """
     mesh, first, begun, least = candidate.mesh, candidate.judged, grid_of(candidate), usual.checked_grid
+    assert first is not None
     off, faulty, lost, held = _distances_off(begun, samples), _NOWHERE, _NOWHERE, _NOWHERE
     taken = last = mesh.copied()
     most = unevenness(begun, mesh.length) - LEAST_EVENED if is_no_worse(begun, least) else np.inf
@@ -71,7 +72,7 @@ def search_on(
         now = judged(grid, samples, boundary, settings)
         grid, passes = now.checked_grid, now.certificate.passed
         is_near = passes and is_as_near(grid, least)
-        if is_near and unevenness(grid, mesh.length) < most and _is_no_poorer(now, usual):
+        if is_near and unevenness(grid, mesh.length) < most and _is_no_poorer(now, first, least):
             candidate.take(now)
             most, taken = unevenness(grid, mesh.length), mesh.copied()
         if passes and (is_near or is_free):
@@ -103,12 +104,12 @@ def _at_rest(net: Net, which: np.ndarray) -> Iterator[None]:
         net.kind[moving] = kinds
 
 
-def _is_no_poorer(now: Judged, usual: Judged) -> bool:
-    """Whether a grid is as even and regular as the usual one, its worst triangle hardly worse, and it has no more warnings."""
-    as_few = len(now.certificate.warnings) <= len(usual.certificate.warnings)
-    found, least = now.grid.quality, usual.grid.quality
-    as_even = found.length_cv <= least.length_cv and found.shape_mean >= least.shape_mean
-    return as_few and as_even and found.shape_min >= LEAST_OF_WORST * least.shape_min
+def _is_no_poorer(now: Judged, first: Judged, least: Grid) -> bool:
+    """Whether a grid has no more warnings than the first one and hardly a worse triangle, and is as even and regular as the least one."""
+    as_few = len(now.certificate.warnings) <= len(first.certificate.warnings)
+    found = now.grid.quality
+    as_even = found.length_cv <= least.quality.length_cv and found.shape_mean >= least.quality.shape_mean
+    return as_few and as_even and found.shape_min >= LEAST_OF_WORST * first.grid.quality.shape_min
 
 
 def unevenness(grid: Grid, length: float) -> float:
