@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import pairwise, product
+from itertools import combinations, pairwise, product
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, Never, cast
@@ -26,6 +26,7 @@ from scantruss.constraints.find import find_constraints
 from scantruss.errors import CertificateError, FrontError
 from scantruss.front.orientation_field import orientation_fields
 from scantruss.grid.certificate import Fault
+from scantruss.improve.candidate import Candidate
 from scantruss.improve.candidate import grid_of as grid_of_candidate
 from scantruss.improve.longer_search import FREE_TURNS, SPARED_AT_FAULT, SPARING_TURNS, search_on
 from scantruss.improve.optimize import improve_last, searched_again
@@ -339,6 +340,32 @@ def test_a_grid_with_ridges_is_searched_on_and_is_in_no_figure_worse() -> None:
     assert len(even.lines) > 0 and known(even.certificate).passed
     assert even.quality.length_cv < usual.quality.length_cv and even.quality.shape_mean >= usual.quality.shape_mean
     assert found.p95 <= theirs.p95 and found.p99 <= theirs.p99
+
+
+@compiled_only
+@pytest.mark.parametrize(("most", "searches"), [(3000, 4), (10, 1)])
+def test_longer_searches_have_meshes_and_chances_of_their_own(
+    monkeypatch: pytest.MonkeyPatch, most: int, searches: int
+) -> None:
+    cloud, settings = st.PointCloud.from_array(cap(4.0, 1.0, 0.25)), st.Settings(length=1.0)
+    steps = steps_of(cloud, settings)
+    fields = orientation_fields(steps.samples, steps.boundary, settings)
+    improved = candidates.improve_fronts(candidates.advance_fronts(*steps, fields, settings), *steps, settings)
+    usual = candidates.chosen(candidates.those_that_pass(improved, *steps, settings))
+    nodes, begun = usual.mesh.net.nodes.copy(), list[tuple[int, Candidate]]()
+
+    def search(candidate: Candidate, *others: Any) -> None:
+        begun.append((others[-1], candidate))
+        assert np.array_equal(candidate.mesh.net.nodes, nodes)
+
+    monkeypatch.setattr(candidates, "search_on", search)
+    monkeypatch.setattr(candidates, "NODES_OF_SEVERAL_SEARCHES", most)
+    assert candidates.searched_on(usual, usual, [], *steps, settings) in [each for _, each in begun]
+    assert sorted(number for number, _ in begun) == list(range(searches))
+    meshes = [each.mesh for _, each in begun]
+    for one, two in combinations(meshes, 2):
+        pairs = zip((*one.net, one.patches), (*two.net, two.patches), strict=True)
+        assert not any(np.shares_memory(*pair) for pair in pairs)
 
 
 @compiled_only

@@ -228,10 +228,10 @@ def searched_on(
     """
     least = usual.judged
     assert least is not None
-    begun = [usual, *passed][:LONGER_SEARCHES]
-    begun += [usual.copy() for _ in range(LONGER_SEARCHES - len(begun))]
-    if len(grid_of(usual).nodes) > NODES_OF_SEVERAL_SEARCHES:
-        begun = [best]
+    begun = [best]
+    if len(grid_of(usual).nodes) <= NODES_OF_SEVERAL_SEARCHES:
+        begun = [usual, *passed][:LONGER_SEARCHES]
+        begun += [usual.copy() for _ in range(LONGER_SEARCHES - len(begun))]
 
     def search(number: int) -> None:
         search_on(begun[number], samples, boundary, constraints, settings, least, number)

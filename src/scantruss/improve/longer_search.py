@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 FREE_TURNS, SPARING_TURNS = 18, 18  # times that a grid is searched again, and again where places are spared
 LEAST_EVENED = 0.001  # fall of `unevenness` that is worth another grid
-FAR_UNEVENNESS = 0.1  # share of the distance at 99 % that counts as uneven [1 / member length]
+FAR_UNEVENNESS = 0.1  # share of the distance of the scan at 99 % [member lengths] that counts as uneven
 MISSED_MORE = 0.002  # share of the scan that the grid of a longer search may miss beyond that of a shorter one
 LEAST_FARTHER = 0.05  # by how much farther from the grid than before a place of the scan is lost [member lengths]
 # distance from a fault, and from a place that was lost, within which no later turn begins [member lengths]
@@ -71,10 +71,10 @@ def search_on(
             )
         now = judged(grid, samples, boundary, settings)
         grid, passes = now.checked_grid, now.certificate.passed
-        is_near = passes and is_as_near(grid, least)
-        if is_near and unevenness(grid, mesh.length) < most and _is_no_poorer(now, first, least):
+        is_near, uneven = passes and is_as_near(grid, least), unevenness(grid, mesh.length)
+        if is_near and uneven < most and _is_no_poorer(now, first, least):
             candidate.take(now)
-            most, taken = unevenness(grid, mesh.length), mesh.copied()
+            most, taken = uneven, mesh.copied()
         if passes and (is_near or is_free):
             last = mesh.copied()
             continue

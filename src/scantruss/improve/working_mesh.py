@@ -273,15 +273,7 @@ class WorkingMesh:
 
     def copy(self) -> WorkingMesh:
         """The same mesh, which can be changed beside this one."""
-        own = self.copied()
-        return replace(
-            self,
-            net=own.net,
-            surface=with_own_scratch(self.surface),
-            patches=own.patches,
-            fixed=own.fixed,
-            projection_distance=own.projection_distance,
-        )
+        return replace(self, surface=with_own_scratch(self.surface), **self.copied()._asdict())
 
     def copied(self) -> Kept:
         """A copy of what trials change."""
