@@ -113,7 +113,7 @@ class MemberSettings(_Checked):
     method: str = _setting("default", "default: the improved method; paper: the paper to the letter", choices=METHODS)
     effort: str = _setting(
         "normal",
-        "how much time to spend on regularity (default method only); best tries 24 fronts and anneals two",
+        "how much time to spend on regularity (default method only); best tries 24 fronts and anneals three",
         choices=EFFORTS,
     )
     prefer: str = _setting(
