@@ -52,8 +52,8 @@ def _inside(polygon: Array, x: Array, y: Array) -> Array:
     """Tell which places lie in a polygon (K, 2): a ray to the right crosses its sides an odd number of times."""
     odd = np.zeros(len(x), bool)
     for (ax, ay), (bx, by) in zip(polygon, np.roll(polygon, -1, axis=0), strict=True):
-        if ay != by:
-            odd ^= ((ay > y) != (by > y)) & (x < ax + (y - ay) * (bx - ax) / (by - ay))
+        beside = np.flatnonzero((ay > y) != (by > y))  # few, so that little is computed for each side
+        odd[beside] ^= x[beside] < ax + (y[beside] - ay) * (bx - ax) / (by - ay)
     return odd
 
 

@@ -6,6 +6,7 @@ import csv
 import math
 import re
 from collections.abc import Iterator, Sequence
+from itertools import islice
 
 ANY_SEPARATOR = "any"  # blanks, commas and semicolons in one line
 COMMENT = re.compile(r"(?<!\.)#|//")  # 1.#IND is how some programs write NaN
@@ -72,6 +73,13 @@ def _is_missing(field: str) -> bool:
 def count_numbers(row: Sequence[str], comma: bool) -> int:
     """Return how many fields are numbers, or words for missing ones."""
     return sum(is_number(field, comma) for field in row)
+
+
+def holds_three(row: Sequence[str], comma: bool) -> bool:
+    """Return whether three fields or more are numbers, or words for missing ones: of a long row the first three are enough."""
+    if len(row) < 3:
+        return False
+    return next(islice(filter(None, (is_number(field, comma) for field in row)), 2, None), False)
 
 
 def holds_numbers(row: Sequence[str], comma: bool) -> bool:

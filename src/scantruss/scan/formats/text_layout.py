@@ -15,7 +15,7 @@ from ..units import metres_of_columns, metres_of_comments
 from .columns import check_not_degrees, find_attributes, fit_columns
 from .kinds import is_text, kind_of, read_head, wrong_kind
 from .own_colors import COLOR_ATTRIBUTES
-from .text_fields import ANY_SEPARATOR, NUMBER_COMMA, count_numbers, header_names, is_number, split_line
+from .text_fields import ANY_SEPARATOR, NUMBER_COMMA, count_numbers, header_names, holds_three, is_number, split_line
 
 BYTES_EXAMINED = 1 << 16  # bytes examined at the start and in the middle
 WIDTH_OF_PTS = 7  # x y z intensity red green blue, as scanners write it without names
@@ -85,7 +85,7 @@ def find_layout(path: Path, wanted: Sequence[str] = ()) -> Layout:
     if (separator, comma) == (",", False):
         _check_not_split_in_two(path, rows)
     split = [(number, split_line(line, separator)) for number, line in enumerate(start)]
-    data = [(number, row) for number, row in split if count_numbers(row, comma) >= 3]
+    data = [(number, row) for number, row in split if holds_three(row, comma)]
     behind = sum(bool(row) for number, row in split if data and number >= data[0][0])
     columns = _numeric_columns([row for _, row in data], comma)
     if not data and not kind:
@@ -130,9 +130,8 @@ def _parts(path: Path, encoding: str) -> tuple[list[str], list[str]]:
 
 def _find_grammar(lines: Sequence[str]) -> tuple[str | None, bool]:
     """Return separator and decimal sign by which most lines hold three numbers."""
-    scores = []
-    for separator, comma in GRAMMARS:
-        scores.append(sum(count_numbers(split_line(line, separator), comma) >= 3 for line in lines))
+    split = {sign: [split_line(line, sign) for line in lines] for sign in dict(GRAMMARS)}
+    scores = [sum(holds_three(row, comma) for row in split[sign]) for sign, comma in GRAMMARS]
     best = max(scores[:-1])
     if 2 * best < scores[-1]:
         return GRAMMARS[-1]
@@ -142,8 +141,8 @@ def _find_grammar(lines: Sequence[str]) -> tuple[str | None, bool]:
 
 def _has_decimal_commas(lines: Sequence[str], separator: str | None) -> bool:
     """Whether one line in ten holds more numbers if commas are decimal: 1,5;2,5;3,5;200;100;50 has only three otherwise."""
-    split = [split_line(line, separator) for line in lines]
-    return 10 * sum(count_numbers(row, True) > count_numbers(row, False) for row in split) > len(split)
+    split = [split_line(line, separator) for line in lines if "," in line]
+    return 10 * sum(count_numbers(row, True) > count_numbers(row, False) for row in split) > len(lines)
 
 
 def _check_not_grouped(path: Path, rows: Sequence[str]) -> None:
