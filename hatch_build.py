@@ -27,6 +27,7 @@ COMMANDS = (
     "grid shell.npy quads.obj --length 1 --cells quad",
     "grid shell.npy paper.obj --length 1 --method paper",
     "grid shell.npy field.obj --length curvature:0.8:1.5",
+    "grid rough.npy rough.obj --length 1 --effort quick",
     "clean shell.npy clean.ply",
     "thin clean.ply -o thin.ply --spacing 0.2",
 )
@@ -91,6 +92,8 @@ def run() -> None:
     x, y = rng.uniform(-10.0, 10.0, (2, 120_000))
     x, y = np.compress(np.hypot(x - 2.0, y) > 3.0, [x, y], axis=1)  # a dense shell with a hole
     np.save("shell.npy", np.column_stack([x, y, (x * x + y * y) / -30.0 + rng.normal(0.0, 0.02, len(x))]))
+    x, y = np.meshgrid(*2 * [np.linspace(-4.0, 4.0, 81)])  # so rough that it is smoothed, and its grid mended
+    np.save("rough.npy", np.column_stack([x.ravel(), y.ravel(), rng.normal(0.0, 0.2, x.size)]))
     for command in COMMANDS:
         words = [word.format(**{name: demo.scan for name, demo in DEMOS.items()}) for word in command.split()]
         if status := main(words):

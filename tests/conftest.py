@@ -24,7 +24,10 @@ settings.load_profile("scantruss")
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
-LONGEST = {f"test_{name}" for name in ("studio_page", "studio_cells_page", "studio_walk", "register", "candidates")}
+LONGEST = {
+    f"test_{name}"
+    for name in ("studio_page", "studio_cells_page", "studio_walk", "register", "candidates", "wide_ridges")
+}
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from scantruss.errors import FormatError
 from scantruss.scan.formats.columns import find_columns
 from scantruss.scan.formats.reading import read_points
+from scantruss.scan.formats.text_fields import count_numbers, holds_three
 
 SHIFT = np.array([500_000.0, 4_500_000.0, 100.0])
 POINTS = np.round(np.random.default_rng(3).random((40, 3)) * [90, 70, 20] - 10 + SHIFT, 3)
@@ -250,3 +251,10 @@ def test_missing_values_are_dropped_and_counted(tmp_path: Path) -> None:
 def test_refusals_say_where_and_what(text: str, words: str) -> None:
     with pytest.raises(FormatError, match=words):
         read(text)
+
+
+@given(
+    st.lists(st.sampled_from(["1", "-2.5", "1,5", ".5e3", "nan", "***", "", "x", "1 2 3"]), max_size=7), st.booleans()
+)
+def test_a_row_holds_three_numbers_where_it_has_so_many(row: list[str], comma: bool) -> None:
+    assert holds_three(row, comma) == (count_numbers(row, comma) >= 3)
