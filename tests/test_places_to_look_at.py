@@ -17,7 +17,7 @@ import scantruss as st
 from scantruss.boundary.find import Boundary, Loop
 from scantruss.check.boundaries import boundary_beyond, boundary_left, places_aside, stops_short
 from scantruss.check.certify import certify
-from scantruss.check.distances import measure_distances
+from scantruss.check.distances import distances_to_grid, measure_distances
 from scantruss.check.doubtful import doubtful_places, zigzags
 from scantruss.check.gaps import bridged_gaps, is_empty_within
 from scantruss.check.limits import places_to_look_at
@@ -173,6 +173,33 @@ def test_a_hole_of_the_scan_is_none_to_doubt_but_one_between_sparse_points_or_le
         judged = np.where(near, OUTLIER, samples.judged).astype(np.uint8)
         found = doubtful_places(grid, replace(samples, judged=judged), 1.0)
         assert [warning.words for warning in found] == ["has a hole where points were left out"] * doubted
+
+
+def test_a_hole_in_which_the_scan_goes_on_is_said_but_a_true_one_and_one_over_another_sheet_are_not() -> None:
+    """As where the front tears a leg hardly wider than its members open; a second sheet lies under a hole, and the grid follows it."""
+    whole = lattice()
+    node = int(np.linalg.norm(whole.nodes, axis=1).argmin())
+    middle, holed = whole.nodes[node], without_node(whole, node)
+    for points, grid, count in (
+        (sheet(13, 8, 0.08), holed, 1),
+        (sheet(13, 8, 0.08), whole, 0),
+        (sheet(13, 8, 0.08, keep=lambda x, y: np.hypot(x - middle[0], y - middle[1]) > 0.8), holed, 0),
+    ):
+        samples, grid = scanned(points, grid)
+        off = distances_to_grid(samples.scan, grid, 1.0)[0]
+        found = doubtful_places(grid, samples, 1.0, off_grid=off)
+        assert [warning.words for warning in found] == [
+            "has a hole where the scan has none; shorter members close it"
+        ] * count
+        for warning in found:
+            assert np.linalg.norm(np.array(known(warning.where))[:2] - middle[:2]) < 0.05
+    below = sheet(13, 8, 0.08) - [0.0, 0.0, 0.4]
+    true = sheet(13, 8, 0.08, keep=lambda x, y: np.hypot(x - middle[0], y - middle[1]) > 0.8)
+    samples, grid = scanned(np.concatenate([true, below]), holed)
+    away = np.abs(samples.scan[:, 2] + samples.origin[2])
+    followed = np.minimum(away, np.abs(away - 0.4))
+    found = doubtful_places(grid, samples, 1.0, off_grid=followed)
+    assert not any("where the scan has none" in warning.words for warning in found)
 
 
 def test_teeth_are_a_zigzag_and_straight_sides_corners_and_a_step_are_none() -> None:
