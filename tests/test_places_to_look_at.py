@@ -23,6 +23,7 @@ from scantruss.check.gaps import bridged_gaps, is_empty_within
 from scantruss.check.limits import places_to_look_at
 from scantruss.check.openings import boundary_overrun
 from scantruss.check.refusal import passed_grid
+from scantruss.cli.shared import follows_both_layers
 from scantruss.errors import CertificateError
 from scantruss.grid.certificate import Certificate, Fault, LeftOut
 from scantruss.report.figures import left_out_lines
@@ -200,6 +201,17 @@ def test_a_hole_in_which_the_scan_goes_on_is_said_but_a_true_one_and_one_over_an
     followed = np.minimum(away, np.abs(away - 0.4))
     found = doubtful_places(grid, samples, 1.0, off_grid=followed)
     assert not any("where the scan has none" in warning.words for warning in found)
+
+
+@pytest.mark.parametrize(("sheets", "both"), [([0.0], False), ([0.2], False), ([0.0, 0.4], True)])
+def test_two_layers_are_said_but_of_a_grid_that_follows_both(sheets: list[float], both: bool) -> None:
+    """A grid on one of two sheets .4 members apart, one between them, and one of both, as of a mug's wall."""
+    points = np.concatenate([sheet(3.5, 5, 0.08), sheet(3.5, 5, 0.08) + [0.0, 0.0, 0.4]])
+    samples, grid = scanned(points, lattice())
+    nodes = np.concatenate([grid.nodes * [1, 1, 0] + [0.0, 0.0, z - samples.origin[2]] for z in sheets])
+    triangles = np.concatenate([grid.triangles + k * len(grid.nodes) for k in range(len(sheets))])
+    made = grid.replace(nodes=nodes, triangles=triangles, fixed=np.zeros(len(nodes), np.bool_))
+    assert follows_both_layers(certify(made, samples, NOTHING, SETTINGS), 0.4, 0.9) == both
 
 
 def test_teeth_are_a_zigzag_and_straight_sides_corners_and_a_step_are_none() -> None:
