@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from ..scan.cloud import PointCloud
     from ..settings import Settings
 
-CORNER_MOVED = 0.25  # distance of the nearest node on a ridge from which on a corner is moved [member lengths]
+CORNER_MOVED = 0.25  # distance of the nearest node from which on a corner is moved [member lengths]
 ENDS_IN_CORNER = 0.1  # distance of the ends of ridges within which they meet in a corner [member lengths]
 # how far from its corner a ridge is followed or not, and distance from the grid's ridges within which it is [member lengths]
 FOLLOWED_FROM, FOLLOWED_WITHIN = 1.0, 0.3
@@ -70,13 +70,13 @@ def moved_corners(grid: Grid, ridges: Sequence[Ridge], length: float) -> list[tu
     chains = [grid.nodes[np.array(each["nodes"], np.int64)] for each in sets_of(grid, RIDGE)]
     if not chains:
         return []
-    nodes, followed = np.concatenate(chains), np.concatenate([_places_along(chain) for chain in chains])
+    followed = np.concatenate([_places_along(chain) for chain in chains])
     outer = grid.nodes[grid.edges[grid.edge_uses == 1].ravel()]
     ends = [(ridge, at, ridge.places[at]) for ridge in ridges if not ridge.ring for at in (0, -1)]
     found: list[tuple[float, np.ndarray]] = []
     for ridge, _, place in ends:
         member = length if grid.desired is None else float(grid.desired[_nearest(grid.nodes, place)])
-        away = _gap(nodes, place)
+        away = _gap(grid.nodes, place)
         if away <= CORNER_MOVED * member or any(np.linalg.norm(place - other) < member / 2 for _, other in found):
             continue
         here = [each for each in ends if np.linalg.norm(each[2] - place) < ENDS_IN_CORNER * member]
