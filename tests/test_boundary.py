@@ -379,3 +379,33 @@ def test_a_gap_between_random_points_is_no_corner_of_the_boundary() -> None:
     gap = points[:, 1] < -5.5 - 1.8 * np.abs(points[:, 0])
     (loop,) = found(points[~gap])[0].loops
     assert gap.sum() > 4 and np.abs(np.abs(loop.points[:, :2]).max(axis=1) - 6.0).max() < 0.1 and len(loop.corners) == 4
+
+
+def scalloped(seed: int, count: int = 24_000) -> np.ndarray:
+    """A flat roof of 16 x 14, cut in at both ends by four arches that meet in cusps; its outer corners have 39 degrees."""
+    random = np.random.default_rng(seed)
+    x, y = random.uniform(0.0, 16.0, count), random.uniform(0.0, 14.0, count)
+    cut = 1.6 * np.sin(np.pi * (x / 4.0 % 1.0))
+    kept = (y > cut) & (y < 14.0 - cut)
+    flat = np.column_stack([x, y])[kept]
+    flat = flat[np.unique(np.floor(flat / 0.06), axis=0, return_index=True)[1]]
+    return np.column_stack([flat, random.normal(0.0, 0.004, len(flat))])
+
+
+@pytest.mark.parametrize("length", [0.68, 0.96, 1.34])
+def test_the_cusps_and_pointed_corners_of_a_scalloped_edge_are_corners(length: float) -> None:
+    """The outer ones were cut off by up to a member, as no member fits across them."""
+    boundary, _ = found(scalloped(3), length)
+    tips = np.array([(x, y, 0.0) for y in (0.0, 14.0) for x in range(0, 17, 4)], float)
+    off = np.linalg.norm(tips[:, None] - boundary.corners, axis=2).min(axis=1)
+    assert len(boundary.corners) == len(tips) and off.max() < 0.26 * length and off.mean() < 0.16 * length
+
+
+def test_a_spike_on_a_straight_side_is_no_corner() -> None:
+    """As pointed as those of a scalloped edge, but the boundary turns off to it."""
+    random = np.random.default_rng(4)
+    x, y = random.uniform(0.0, 10.0, 24_000), random.uniform(-1.0, 8.0, 24_000)
+    kept = (y > 0.0) | (np.abs(x - 5.0) < 0.3 * (1.0 + y / 0.9))
+    boundary, _ = found(np.column_stack([x, y, np.zeros(len(x))])[kept], 1.0)
+    assert len(boundary.corners) == 4
+    assert np.linalg.norm(boundary.loops[0].points - [5.0, -0.9, 0.0], axis=1).min() > 0.5

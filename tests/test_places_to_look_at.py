@@ -17,12 +17,13 @@ import scantruss as st
 from scantruss.boundary.find import Boundary, Loop
 from scantruss.check.boundaries import boundary_beyond, boundary_left, places_aside, stops_short
 from scantruss.check.certify import certify
-from scantruss.check.distances import measure_distances
+from scantruss.check.distances import distances_to_grid, measure_distances
 from scantruss.check.doubtful import doubtful_places, zigzags
 from scantruss.check.gaps import bridged_gaps, is_empty_within
 from scantruss.check.limits import places_to_look_at
 from scantruss.check.openings import boundary_overrun
 from scantruss.check.refusal import passed_grid
+from scantruss.cli.shared import follows_both_layers
 from scantruss.errors import CertificateError
 from scantruss.grid.certificate import Certificate, Fault, LeftOut
 from scantruss.report.figures import left_out_lines
@@ -173,6 +174,44 @@ def test_a_hole_of_the_scan_is_none_to_doubt_but_one_between_sparse_points_or_le
         judged = np.where(near, OUTLIER, samples.judged).astype(np.uint8)
         found = doubtful_places(grid, replace(samples, judged=judged), 1.0)
         assert [warning.words for warning in found] == ["has a hole where points were left out"] * doubted
+
+
+def test_a_hole_in_which_the_scan_goes_on_is_said_but_a_true_one_and_one_over_another_sheet_are_not() -> None:
+    """As where the front tears a leg hardly wider than its members open; a second sheet lies under a hole, and the grid follows it."""
+    whole = lattice()
+    node = int(np.linalg.norm(whole.nodes, axis=1).argmin())
+    middle, holed = whole.nodes[node], without_node(whole, node)
+    for points, grid, count in (
+        (sheet(13, 8, 0.08), holed, 1),
+        (sheet(13, 8, 0.08), whole, 0),
+        (sheet(13, 8, 0.08, keep=lambda x, y: np.hypot(x - middle[0], y - middle[1]) > 0.8), holed, 0),
+    ):
+        samples, grid = scanned(points, grid)
+        off = distances_to_grid(samples.scan, grid, 1.0)[0]
+        found = doubtful_places(grid, samples, 1.0, off_grid=off)
+        assert [warning.words for warning in found] == [
+            "has a hole where the scan has none; shorter members close it"
+        ] * count
+        for warning in found:
+            assert np.linalg.norm(np.array(known(warning.where))[:2] - middle[:2]) < 0.05
+    below = sheet(13, 8, 0.08) - [0.0, 0.0, 0.4]
+    true = sheet(13, 8, 0.08, keep=lambda x, y: np.hypot(x - middle[0], y - middle[1]) > 0.8)
+    samples, grid = scanned(np.concatenate([true, below]), holed)
+    away = np.abs(samples.scan[:, 2] + samples.origin[2])
+    followed = np.minimum(away, np.abs(away - 0.4))
+    found = doubtful_places(grid, samples, 1.0, off_grid=followed)
+    assert not any("where the scan has none" in warning.words for warning in found)
+
+
+@pytest.mark.parametrize(("sheets", "both"), [([0.0], False), ([0.2], False), ([0.0, 0.4], True)])
+def test_two_layers_are_said_but_of_a_grid_that_follows_both(sheets: list[float], both: bool) -> None:
+    """A grid on one of two sheets .4 members apart, one between them, and one of both, as of a mug's wall."""
+    points = np.concatenate([sheet(3.5, 5, 0.08), sheet(3.5, 5, 0.08) + [0.0, 0.0, 0.4]])
+    samples, grid = scanned(points, lattice())
+    nodes = np.concatenate([grid.nodes * [1, 1, 0] + [0.0, 0.0, z - samples.origin[2]] for z in sheets])
+    triangles = np.concatenate([grid.triangles + k * len(grid.nodes) for k in range(len(sheets))])
+    made = grid.replace(nodes=nodes, triangles=triangles, fixed=np.zeros(len(nodes), np.bool_))
+    assert follows_both_layers(certify(made, samples, NOTHING, SETTINGS), 0.4, 0.9) == both
 
 
 def test_teeth_are_a_zigzag_and_straight_sides_corners_and_a_step_are_none() -> None:

@@ -19,6 +19,7 @@ from .looks import (
     stands_on_columns,
 )
 from .lost_ridges import lost_ridges
+from .moved_corners import with_moved_corners
 from .table import AS_ASKED, SECOND_LAYOUT, Attempt, attempts, layouts_of
 
 if TYPE_CHECKING:
@@ -129,6 +130,7 @@ class AttemptCourse:
             return
         given_up = attempt.ridges_given_up(self._cloud)
         lost = lost_ridges(grid, self._cloud, self._settings, given_up)
+        grid = with_moved_corners(grid, self._cloud, self._settings, attempt.wide)
         grid = with_ridges_lost(with_ridges_given_up(grid, given_up), lost)
         if attempt.row == BETWEEN_WALLS:
             assert self._passed is not None

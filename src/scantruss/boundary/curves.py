@@ -83,23 +83,6 @@ def normals_along(surface: Surface, turns: np.ndarray) -> np.ndarray:
     return normals
 
 
-def cut_spikes(surface: Surface, curve: np.ndarray, width: float, step: float) -> np.ndarray:
-    """Cut off tongues and bays of a closed curve that are narrower than `width`: no member fits into them.
-
-    Two places nearer than `width`, with more than 2.5 but less than 30 widths of the curve (or half of it) between them, are
-    joined directly.
-    """
-    for _ in range(len(curve)):  # each cut takes away more places than it adds
-        normals = normals_along(surface, curve)
-        high = min(len(curve) // 2, round(30.0 * width / step))
-        at, gap = kernels.widest_spike(curve, normals, width, round(2.5 * width / step), high)
-        if gap == 0:
-            break
-        curve = np.roll(curve, -at, axis=0)
-        curve = resample(np.concatenate([curve[:1], curve[gap:]]), step)
-    return curve
-
-
 def smooth_between(
     curve: np.ndarray, at: np.ndarray, places: np.ndarray, halves: Sequence[int]
 ) -> tuple[list[np.ndarray], np.ndarray]:

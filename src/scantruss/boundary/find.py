@@ -20,17 +20,16 @@ from ..settings import Settings
 from ..surface.near_scan import distance_from_scan
 from ..surface.samples import SurfaceSamples, broad_normals, is_graded, samples_with
 from .corners import CURVE_STEP
-from .curves import cut_spikes, length_around, resample
+from .curves import length_around, resample
 from .density import disc_beside
 from .given import cut_along
 from .holes import fill_holes
-from .offset import NO_BIAS, SamplingBias, offset_curve, sampling_bias_of
+from .offset import NO_BIAS, NO_TIPS, SamplingBias, offset_curve, sampling_bias_of
 from .rolling_disc import boundary_loops
+from .spikes import without_spikes
 from .touched_points import boundary_points
 from .tube_ends import end_of_tube
 
-# tongues and bays narrower than these widths are cut off, one width after the other [member lengths]
-SPIKE_LENGTHS = (0.6, 0.3, 0.16)
 LEAST_OPEN_SHARE = 0.6  # share of a loop that must have room for a disc outside
 # a piece this many times larger than a disc with its boundary length is nearly closed: the loop is a hole
 NEARLY_CLOSED = 10.0
@@ -200,7 +199,7 @@ def _find_loops(samples: SurfaceSamples, settings: Settings) -> tuple[list[Loop]
     """All loops except those of small gaps, none marked external yet; and the curves (M, 3) around these gaps."""
     length = settings.length
     radius = max(settings.boundary_radius * length, 1.3 * samples.surface.radius, 1.9 * samples.spacing)
-    found: list[tuple[np.ndarray, int, SamplingBias]] = []
+    found: list[tuple[np.ndarray, int, SamplingBias, np.ndarray]] = []
     surface = samples.surface._replace(normals=broad_normals(samples.surface))
     rolled, short = boundary_loops(
         surface, samples.piece, radius, 0.8 * settings.bridged_boundary_length, samples.on_edge, samples.origin
@@ -215,16 +214,14 @@ def _find_loops(samples: SurfaceSamples, settings: Settings) -> tuple[list[Loop]
             continue
         if kernels.open_share(surface, samples.boxes, points, loop[0], radius) < LEAST_OPEN_SHARE:
             continue
-        curve = resample(points, CURVE_STEP * length)
-        for width in SPIKE_LENGTHS:
-            curve = cut_spikes(surface, curve, width * length, CURVE_STEP * length)
+        curve, tips = without_spikes(surface, resample(points, CURVE_STEP * length), length, keeps_tips=not paper)
         if len(curve) >= 8:
             bias = NO_BIAS if paper else sampling_bias_of(whole, points, curve, disc)
-            found.append((curve, piece, bias))
+            found.append((curve, piece, bias, tips))
     found = [each for each in found if not _at_ring(each[0], samples, length)]
     bridged = [curve for curve in bridged if not _at_ring(curve, samples, length)]
-    smoothed = [smooth_loop(*each, settings, whole) for each in found]
-    bridged += [curve for (curve, _, _), loop in zip(found, smoothed, strict=True) if loop is None]
+    smoothed = [smooth_loop(*each[:3], settings, whole, each[3]) for each in found]
+    bridged += [curve for (curve, *_), loop in zip(found, smoothed, strict=True) if loop is None]
     return [loop for loop in smoothed if loop is not None], bridged
 
 
@@ -328,9 +325,11 @@ def with_line_ends(loop: Loop, places: np.ndarray) -> Loop:
     return replace(loop, points=points, corner_at=corner_at, line_at=line_at.astype(np.int64), desired=desired)
 
 
-def smooth_loop(curve: np.ndarray, piece: int, bias: SamplingBias, settings: Settings, surface: Surface) -> Loop | None:
-    """Make a loop of a closed curve of equal steps through boundary points; None if it is too short to keep."""
-    smoothed, corner_at = offset_curve(curve, bias, settings, surface)
+def smooth_loop(
+    curve: np.ndarray, piece: int, bias: SamplingBias, settings: Settings, surface: Surface, tips: np.ndarray = NO_TIPS
+) -> Loop | None:
+    """Make a loop of a closed curve of equal steps through boundary points, tips as of `offset_curve`; None if it is too short to keep."""
+    smoothed, corner_at = offset_curve(curve, bias, settings, surface, tips)
     length, field = length_around(smoothed), field_along(surface, smoothed)
     in_lengths = length if field is None else float((_steps(smoothed) / _between(field)).sum())
     if (in_lengths if settings.fill_holes is None else length) < settings.bridged_boundary_length:

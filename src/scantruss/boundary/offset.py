@@ -9,7 +9,7 @@ import numpy as np
 from ..kernels.surface.local_surface import Surface
 from ..scan.vectors import dots, units
 from ..settings import Settings
-from .corners import CURVE_STEP, find_corners
+from .corners import CURVE_STEP, NEAREST_CORNERS, find_corners
 from .curves import heights_along, outward, resample, room_across, runs_around, smooth_between
 from .density import SlidingDisc, density_along
 from .four_sides import corners_of_four_sides
@@ -61,6 +61,7 @@ class SamplingBias:
         return self.beyond * share, density
 
 
+NO_TIPS = np.zeros((0, 3))
 NO_BIAS = SamplingBias(0.0, np.inf)  # what method "paper" assumes
 
 
@@ -89,12 +90,14 @@ def sampling_bias_of(surface: Surface, points: np.ndarray, curve: np.ndarray, di
 
 
 def offset_curve(
-    curve: np.ndarray, bias: SamplingBias, settings: Settings, surface: Surface
+    curve: np.ndarray, bias: SamplingBias, settings: Settings, surface: Surface, tips: np.ndarray = NO_TIPS
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return a closed curve (M, 3) of equal steps through boundary points, the surface to its left, as the surface ends there.
 
     The curve is moved out by most of the sampling bias, its corners are found, and it is smoothed between them, more strongly
     where random sampling explains what that takes away.
+
+    tips : (P, 3) places of the curve that are pointed corners, whether they are found or not
 
     Returns
     -------
@@ -102,16 +105,15 @@ def offset_curve(
     corner_at : (C,) int64, points of it that are corners
     """
     if bias.beyond == 0.0:
-        (narrow,), corner_at = smooth_between(
-            curve, *_corners(curve, bias, np.zeros(0), settings, surface), [round(SMOOTHING_WINDOW / CURVE_STEP)]
-        )
+        corners = with_tips(*_corners(curve, bias, np.zeros(0), settings, surface), curve, tips, settings.length)
+        (narrow,), corner_at = smooth_between(curve, *corners, [round(SMOOTHING_WINDOW / CURVE_STEP)])
         return narrow, corner_at
     step = CURVE_STEP * settings.length
     curve = close_random_bays(curve, bias, settings.length, surface)
     beyond, density = bias.along(surface, curve)
     room = OFFSET_SHARE * room_across(curve, ROOM_ACROSS * settings.length, step)
     curve = curve + np.minimum(OFFSET_OF_BIAS * beyond, room)[:, None] * outward(surface, curve)
-    at, places = _corners(curve, bias, density, settings, surface)
+    at, places = with_tips(*_corners(curve, bias, density, settings, surface), curve, tips, settings.length)
     halves = [
         round(SMOOTHING_WINDOW / CURVE_STEP),
         *(min(round(wide / CURVE_STEP), len(curve) // CURVE_PARTS) for wide in WIDER_WINDOWS),
@@ -124,6 +126,18 @@ def offset_curve(
         share = explained(one - narrow, out, room, density * step, WINDOW_SHIFT * beyond)
         smoothed = smoothed + share[:, None] * (one - smoothed)
     return smoothed, corner_at
+
+
+def with_tips(
+    at: np.ndarray, places: np.ndarray, curve: np.ndarray, tips: np.ndarray, length: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return where a curve (M, 3) has corners (C,) and their places (C, 3), with the tips (P, 3) beside which there is none yet."""
+    for tip in tips:
+        if np.linalg.norm(places - tip, axis=1).min(initial=np.inf) > NEAREST_CORNERS * length:
+            nearest = int(np.linalg.norm(curve - tip, axis=1).argmin())
+            order = int(np.searchsorted(at, nearest))
+            at, places = np.insert(at, order, nearest), np.insert(places, order, curve[nearest], axis=0)
+    return at, places
 
 
 def close_random_bays(curve: np.ndarray, bias: SamplingBias, length: float, surface: Surface) -> np.ndarray:

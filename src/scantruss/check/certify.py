@@ -102,7 +102,7 @@ class Judged:
         offsets, (gaps, bridged), doubtful, aside, beyond, beside, (apart, struts), bare, peaks = side_by_side(
             lambda: _offsets(grid, samples, length),
             lambda: bridged_gaps(grid, samples, boundary, length),
-            lambda: [] if settings.boundary else doubtful_places(grid, samples, length, boundary.corners),
+            lambda: [] if settings.boundary else doubtful_places(grid, samples, length, boundary.corners, found.scan),
             lambda: _at_boundary(grid, samples, boundary, found, followed, members, length),
             lambda: boundary_faults(grid, samples, boundary, length),
             lambda: [] if rough else _beside(grid, samples, found, followed, members),

@@ -10,6 +10,7 @@ from ..grid.certificate import Fault, place_of
 from ..kernels.geometry.components import component_labels
 from ..scan.cloud import by_x
 from ..surface.chosen_samples import DUPLICATE, KEPT
+from .filled import goes_on_within
 from .gaps import PLACES_ACROSS_GAP, is_empty_within
 from .limits import PLACES_KEPT
 
@@ -23,6 +24,7 @@ SPIKE_TURN = 130.0  # turn at a node from which on it is the tip of a spike, of 
 NO_CORNERS = np.zeros((0, 3))
 ZIGZAG_TURN = 130.0  # sum of the turns to either side among them from which on a boundary runs zigzag [degree]
 SMALL_HOLE = 12  # nodes around a hole up to which it may be none
+TORN_HOLE = 40  # ... where the scan goes on in it
 # share of a hole that must be filled by points that were left out for it to be none: a few outliers in a courtyard, or a mast, fill less
 FILLED_SHARE = 0.25
 # distance within which a point fills its surface, in that of the points around the hole from their sixth neighbours: of nine places in
@@ -32,20 +34,35 @@ POINTS_AROUND_HOLE, POINTS_COMPARED, NEIGHBOR_COUNTED = 3000, 200, 6  # by how m
 
 
 def doubtful_places(
-    grid: Grid, samples: SurfaceSamples, length: float, corners: np.ndarray = NO_CORNERS
+    grid: Grid,
+    samples: SurfaceSamples,
+    length: float,
+    corners: np.ndarray = NO_CORNERS,
+    off_grid: np.ndarray | None = None,
 ) -> list[Fault]:
-    """Return warnings of boundaries that run zigzag and of small holes that may be none; desired member length given [scan unit].
+    """Return warnings of boundaries that run zigzag and of holes that may be none; desired member length given [scan unit].
 
+    Parameters
+    ----------
     corners : (C, 3) of the scan's boundary, which turns there
+    off_grid : (N,) distance of each point that was read from the grid, by which holes are known in which the scan goes on
     """
     label = component_labels(len(grid.nodes), grid.edges[:, 0], grid.edges[:, 1])
     loops = sorted(grid.boundary_loops, key=len, reverse=True)
     pieces = [int(label[loop[0]]) for loop in loops]
-    holes = [loop for at, loop in enumerate(loops) if pieces[at] in pieces[:at] and len(loop) <= SMALL_HOLE]
+    torn = [] if off_grid is None else [loop for loop in loops if _is_torn(grid.nodes[loop], samples, off_grid, length)]
+    known = {int(loop[0]) for loop in torn}
+    holes = [
+        loop
+        for at, loop in enumerate(loops)
+        if pieces[at] in pieces[:at] and len(loop) <= SMALL_HOLE and int(loop[0]) not in known
+    ]
     kinds = [_kind_of_hole(grid.nodes[loop], samples, length) for loop in holes] if holes else []
     left_out = [grid.nodes[loop].mean(axis=0) for loop, kind in zip(holes, kinds, strict=True) if kind == "left out"]
     sparse = [grid.nodes[loop].mean(axis=0) for loop, kind in zip(holes, kinds, strict=True) if kind == "sparse"]
+    in_torn = np.array([grid.nodes[loop].mean(axis=0) for loop in torn])
     found = (
+        _warning("hole", "has a hole where the scan has none; shorter members close it", in_torn, grid.origin),
         _warning("zigzag", "runs zigzag at its boundary", grid.nodes[zigzags(grid, corners, length)], grid.origin),
         _warning("hole", "has a hole where points were left out", np.array(left_out), grid.origin),
         _warning("hole", "has a hole that may be none, so far apart are the points", np.array(sparse), grid.origin),
@@ -91,6 +108,11 @@ def zigzags(grid: Grid, corners: np.ndarray = NO_CORNERS, length: float = 0.0) -
         highest = least >= np.max([np.roll(least, k) for k in range(-NODES_TURNED_OVER, NODES_TURNED_OVER + 1)], axis=0)
         found.append(loop[(least > ZIGZAG_TURN) & highest & (least > np.roll(least, 1))])
     return np.concatenate(found)
+
+
+def _is_torn(around: np.ndarray, samples: SurfaceSamples, off_grid: np.ndarray, length: float) -> bool:
+    """Return whether the scan goes on within nodes around a hole (K, 3), so few that it may be none."""
+    return len(around) <= TORN_HOLE and goes_on_within(around, samples, off_grid, length)
 
 
 def _kind_of_hole(around: np.ndarray, samples: SurfaceSamples, length: float) -> str:

@@ -247,7 +247,9 @@ def _warning(grid: Grid, samples: SurfaceSamples, found: Distances, parts: list[
     several = f"{len(parts)} parts of the scan, the largest" if len(parts) > 1 else "a part of the scan"
     is_planar = grid.settings is not None and grid.settings.planar
     why = (
-        "as panels were made planar, or for a beam or a rib" if is_planar else "such as a beam, a rib or a second layer"
+        "as panels were made planar, or for a beam or a rib"
+        if is_planar
+        else "such as a beam, a rib, a lip or a second layer"
     )
     words = (
         f"does not follow {several} {words_of_number(_size(parts[0], samples), 3)}{unit} long, {why}:"

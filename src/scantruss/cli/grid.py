@@ -199,7 +199,7 @@ def grid_with_notes(
     if settings.symmetry:
         bars.note(words_of_symmetry([row for row in made.symmetry if not isinstance(row, str)]))
     note_outliers(bars, cloud, made, listed=grid.certificate)
-    note_layers(bars, cloud, made)
+    note_layers(bars, cloud, made, grid.certificate)
     note_corners(bars, cloud, made)
     note_pieces(bars, cloud, made)
     return grid

@@ -22,6 +22,9 @@ if TYPE_CHECKING:
     from ..surface.samples import SurfaceSamples
     from .options import Parser
 
+# least share of the surface that has two layers, from which on a twentieth of the points is off a grid of one sheet, and distance within
+# which all others lie where it follows both [distance of the layers]
+LEAST_SHARE_OF_LAYERS, NEAR_BOTH_LAYERS = 0.15, 0.35
 MOST_PIECES = 5  # pieces that are named one by one
 SHORTEST_ADVISED, LONGEST_ADVISED = 1.1, 2.0  # members that are advised where corners are doubtful [member lengths]
 SCAN_HELP = "scan file, or a pattern in quotes such as 'tiles/*.laz': several files that are one scan"
@@ -140,18 +143,27 @@ def note_outliers(
         )
 
 
-def note_layers(bars: Bars, cloud: PointCloud, settings: Settings) -> None:
-    """Report two layers of the scan closer than half a member, and what to do."""
+def note_layers(bars: Bars, cloud: PointCloud, settings: Settings, made: Certificate | None = None) -> None:
+    """Report two layers of the scan closer than half a member, and what to do; not where the grid that was made follows both."""
     from ..surface.samples import sample_surface
 
     distance, share = sample_surface(cloud, settings).layers
-    if share > 0.0 and not settings.thin_walls:
+    if share > 0.0 and not settings.thin_walls and not follows_both_layers(made, distance, share):
         unit = f" {cloud.unit}" if cloud.unit else ""
         bars.note(
             f"the scan has two layers about {words_of_number(distance, 2)}{unit} apart on {share:.0%} of its surface,"
             " such as top and underside; the grid is one sheet between or on them: crop one layer away for a grid of the other,"
             " or try --thin-walls for both"
         )
+
+
+def follows_both_layers(made: Certificate | None, distance: float, share: float) -> bool:
+    """Whether a grid follows both of two layers some distance apart: one sheet lies half of that off a twentieth of the points or more.
+
+    share : of the surface that has two layers, of whose points one sheet follows half at most
+    """
+    away = None if made is None else made.scan_distance
+    return away is not None and share >= LEAST_SHARE_OF_LAYERS and away.p95 < NEAR_BOTH_LAYERS * distance
 
 
 def note_corners(bars: Bars, cloud: PointCloud, settings: Settings) -> None:

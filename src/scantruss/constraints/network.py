@@ -113,7 +113,14 @@ class Network:
             self.tracks.append(track)
 
     def add(
-        self, points: np.ndarray, closed: bool, corners: Sequence[int], *, name: str = "", sharp: bool = False
+        self,
+        points: np.ndarray,
+        closed: bool,
+        corners: Sequence[int],
+        *,
+        name: str = "",
+        sharp: bool = False,
+        meets: Sequence[int] = (),
     ) -> None:
         """Add a line.
 
@@ -123,11 +130,12 @@ class Network:
         corners : points of it that become nodes, the sharpest first
         name : of the set of its nodes
         sharp : whether it is a ridge
+        meets : its ends, 0 the first and -1 the last, in which other lines end: corners that no line beside them takes up
         """
         marks = {int(i) for i in corners}
         order = list(dict.fromkeys(int(i) for i in corners))
         if not closed:
-            points, shift = self._lengthened(points)
+            points, shift = self._lengthened(points, meets)
             marks, order = {i + shift for i in marks}, [i + shift for i in order]
         near = [track.nearest(points) for track in self.tracks]
         if closed and near:
@@ -184,12 +192,14 @@ class Network:
         track.stops.append((arc, self._new_stop(np.array(place))))
         return track.stops[-1][1]
 
-    def _lengthened(self, points: np.ndarray) -> tuple[np.ndarray, int]:
-        """A line with its ends led to what they nearly reach; how many points were put before it."""
+    def _lengthened(self, points: np.ndarray, meets: Sequence[int]) -> tuple[np.ndarray, int]:
+        """A line with its ends led to what they nearly reach, corners only to the boundary; how many points were put before it."""
         shift = 0
         for at in (0, -1):
             best, foot = np.inf, points[at]
             for track in self.tracks:
+                if at in meets and track.loop < 0:
+                    continue
                 distance, arc = track.nearest(points[at][None])
                 if distance[0] < best:
                     best, foot = float(distance[0]), np.array(at_arc(track.arrays, 0, float(arc[0]))[1:])

@@ -27,6 +27,7 @@ FAULT_REACH = 1.8  # distance from a fault within which ridges are given up [mem
 LEAST_REMAINDER = 2.0  # least length of what is left of such a ridge [member lengths]
 AT_RIDGE = 0.75  # farthest that a ridge passes a place that names it [member lengths]
 ACUTE_RIDGE = np.radians(85.0)  # median fold from which on a ridge is acute
+ONE_CORNER = 0.1  # distance of the ends of ridges within which they end in one corner [member lengths]
 LONGEST_BETWEEN_CORNERS = 1.8  # longest ridge that is looked for between two corners [member lengths]
 OVER_OPENING = 0.75  # step of a ridge above which it goes on behind an opening [member lengths]
 SHORTEST_RIDGE = 0.35  # shortest such ridge [member lengths]
@@ -130,7 +131,14 @@ def add_ridges(network: Network, ridges: list[Ridge]) -> None:
     for number, ridge in enumerate(ridges, 1):
         places = np.concatenate([ridge.places, ridge.places[:1]]) if ridge.ring else ridge.places
         points, _ = divide_polyline(places, ridge.ring, LINE_STEP * network.length)
-        network.add(points, ridge.ring, [], name=f"ridge {number}", sharp=True)
+        others = [other for other in ridges if other is not ridge and not other.ring]
+        meets = [at for at in (0, -1) if any(_ends_at(other, ridge.places[at], network.length) for other in others)]
+        network.add(points, ridge.ring, [], name=f"ridge {number}", sharp=True, meets=meets)
+
+
+def _ends_at(ridge: Ridge, place: np.ndarray, length: float) -> bool:
+    """Whether a ridge ends at a place (3,)."""
+    return bool(np.linalg.norm(ridge.places[[0, -1]] - place, axis=1).min() < ONE_CORNER * length)
 
 
 def kept_ridges(ridges: list[Ridge], length: float) -> list[Ridge]:
