@@ -12,9 +12,8 @@ from .curves import normals_along, resample
 # tongues and bays narrower than these widths are cut off, one width after the other [member lengths]
 SPIKE_LENGTHS = (0.6, 0.3, 0.16)
 TIP_ANGLE = 25.0  # least angle of a pointed corner, in which a triangle has room [degree]
-SIDES_BEFORE_TIP = (
-    0.5  # length of the curve before and after it, from which its sides run straight to the tip [member lengths]
-)
+# length of the curve before and after it, from which its sides run straight to the tip [member lengths]
+SIDES_BEFORE_TIP = 0.5
 COSINE_BEFORE_TIP = 0.85  # least cosine of the angle between them: a spike on a straight boundary turns off at its foot
 OFF_SIDES = 0.05  # distance of the places of a pointed corner from its sides (rms), at most [member lengths]
 PLACES_LOST_AT_MOUTH = 3.0  # farthest that the curve has moved where such a corner was cut off [steps]

@@ -16,14 +16,10 @@ PLACES_ALONG_HOLE = 24  # places across the box around a hole that are looked at
 # distance of those from the nodes and members around the hole at least, height of points over them at most, and their distance from the
 # grid at least, in that of the place from its edge: nearer ones are of a part that the grid follows [member lengths]
 FROM_EDGE, NEAR_HOLE, OFF_GRID = 0.1, 0.5, 0.6
-GOES_ON_WITHIN = (
-    0.12  # distance from a point within which a place is filled [member lengths], or in spacings of the points
-)
-SPACINGS_FILLED = 2.0
-LEAST_FILLED, FEWEST_PLACES_IN_HOLE = (
-    0.5,
-    8,
-)  # share of the places that are filled where the scan goes on, and how many there are at least
+# distance from a point within which a place is filled [member lengths], or in spacings of the points
+GOES_ON_WITHIN, SPACINGS_FILLED = 0.12, 2.0
+# share of the places that are filled where the scan goes on, and how many places there are at least
+LEAST_FILLED, FEWEST_PLACES_IN_HOLE = 0.5, 8
 
 
 def goes_on_within(around: np.ndarray, samples: SurfaceSamples, off_grid: np.ndarray, length: float) -> bool:
