@@ -333,6 +333,21 @@ def test_of_lengths_that_pass_one_is_suggested_that_is_followed_by_another(monke
     assert advice.suggest() == shorter
 
 
+def test_of_lengths_that_pass_with_the_next_above_one_is_suggested_that_loses_little(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As of ground with trees: the one nearer to the usual length lost 2 % of it, with twice the warnings."""
+    advice = Advice(cloud_of("limpet"), st.Settings(length=1.0))
+    monkeypatch.setattr(Advice, "_count_at", lambda *_: None)
+    monkeypatch.setattr(Advice, "_ladder", lambda _: iter(()))
+    advice._left = 0.0  # nothing else is tried
+    lengths = [round_length(share * advice._usual, "nearest") for share in (1.4, 2.0, 2.8)]
+    advice._found = {each: trial_of(each) for each in lengths}
+    assert advice.suggest() == lengths[0]
+    advice._found[lengths[0]] = trial_of(lengths[0], left_out=(LeftOut("far", 9, 0.02),))
+    assert advice.suggest() == lengths[1]
+
+
 def test_a_length_that_only_the_table_tried_and_that_passes_is_suggested_in_place_of_one_that_does_not() -> None:
     cloud = cloud_of("limpet")
     advice = Advice(cloud, st.Settings(length=1.0))

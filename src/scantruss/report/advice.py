@@ -153,9 +153,9 @@ class Advice:
 
         It is the first of those tried in turn that passes with what is next above it, both without much of the scan lost; else of
         those that pass with what is next above them the first that loses hardly more than the least; else the next below one that
-        passes, if it passes too; else one that passes, if there is one with another not far above it that passes too; else the usual
-        length. Where none passes, longer ones are looked at once more, then those beside the usual one. One that closes openings or
-        loses ridges gives way to one that does not, if that passes and loses no more.
+        passes, if it passes too; else one that passes, if there is one with another not far above it that passes too, and rather
+        one that loses little; else the usual length. Where none passes, longer ones are looked at once more, then those beside the
+        usual one. One that closes openings or loses ridges gives way to one that does not, if that passes and loses no more.
         """
         self.is_spent = True
         low, high = length_range(self._cloud)
@@ -197,7 +197,8 @@ class Advice:
             if trial is not None and trial.passed and passing[0] <= ladder.NEARLY_NEXT * below:
                 return below
         followed = [one for one in passing if any(one < other <= ladder.NEARLY_NEXT * one for other in passing)]
-        return min(followed or passing, key=self._far_from_usual, default=self._usual)
+        complete = [one for one in followed if self._found[one].lost <= ladder.MOST_LOST]
+        return min(complete or followed or passing, key=self._far_from_usual, default=self._usual)
 
     def _is_hopeless(self) -> bool:
         """Whether some lengths were tried, and the grids of all of them are far from passing or fail by their fronts."""
