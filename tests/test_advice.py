@@ -26,6 +26,7 @@ from scantruss.check.crossings import MOST_CROSSINGS
 from scantruss.cli.main import main
 from scantruss.errors import FrontError, OneSidedError
 from scantruss.grid.certificate import Certificate, Fault, LeftOut
+from scantruss.grid.line_sets import RIDGE
 from scantruss.report import ladder
 from scantruss.report.advice import Advice
 from scantruss.report.ladder import HOPELESS_NEARBY, LEAST_TRIED, MOST_TRIED, SURE_PER_SPACING, TRIED_AROUND
@@ -330,6 +331,21 @@ def test_of_lengths_that_pass_one_is_suggested_that_is_followed_by_another(monke
     assert advice.suggest() == usual
     advice._found[shorter] = LengthTrial(shorter, passed)
     assert advice.suggest() == shorter
+
+
+def test_of_lengths_that_pass_with_the_next_above_one_is_suggested_that_loses_little(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As of ground with trees: the one nearer to the usual length lost 2 % of it, with twice the warnings."""
+    advice = Advice(cloud_of("limpet"), st.Settings(length=1.0))
+    monkeypatch.setattr(Advice, "_count_at", lambda *_: None)
+    monkeypatch.setattr(Advice, "_ladder", lambda _: iter(()))
+    advice._left = 0.0  # nothing else is tried
+    lengths = [round_length(share * advice._usual, "nearest") for share in (1.4, 2.0, 2.8)]
+    advice._found = {each: trial_of(each) for each in lengths}
+    assert advice.suggest() == lengths[0]
+    advice._found[lengths[0]] = trial_of(lengths[0], left_out=(LeftOut("far", 9, 0.02),))
+    assert advice.suggest() == lengths[1]
 
 
 def test_a_length_that_only_the_table_tried_and_that_passes_is_suggested_in_place_of_one_that_does_not() -> None:
@@ -783,3 +799,100 @@ def test_info_gives_the_boundaries_of_the_grid_that_passes(tmp_path: Path, monke
     monkeypatch.setattr(Advice, "tried", property(by_plain_body))
     assert main(["info", str(tmp_path / "plate.npy")]) == 0
     assert seen[-1]
+
+
+def trial_of(length: float, *kinds: str, ridge: float = 0.0, left_out: tuple[LeftOut, ...] = ()) -> LengthTrial:
+    """Return a trial that passes with warnings of some kinds and so much ridge."""
+    warnings = tuple(Fault(kind, f"is {kind}") for kind in kinds)
+    found = Certificate("", 0.5, True, True, 1, 1, 1, 1, 1, 0, warnings=warnings, left_out=left_out)
+    line = SimpleNamespace(name="", kind=RIDGE, nodes=np.zeros(0, np.int64), length=lambda _: ridge)
+    return LengthTrial(length, cast(Any, SimpleNamespace(certificate=found, line_sets=(line,))))
+
+
+@pytest.mark.parametrize(("ridge", "taken"), [(8.0, True), (0.0, False)])
+def test_a_length_that_loses_ridges_gives_way_to_the_next_above_that_follows_them(
+    ridge: float, taken: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The round lip of a bowl is a ridge to long members, and none to members so short that the bowl takes 12,000 of them."""
+
+    def tried(advice: Advice, length: float, most: int = 0) -> LengthTrial:
+        share = length / advice._usual
+        lost = ("lost",) if 0.9 < share < 1.1 else ()
+        return trial_of(length, *lost, ridge=ridge * length if share > 1.1 else 0.0)
+
+    monkeypatch.setattr(Advice, "try_length", tried)
+    advice = Advice(cloud_of("limpet"), st.Settings(length=1.0))
+    usual = advice._usual
+    assert advice.suggest() == (advice.next_above(usual) if taken else advice.next_below(usual))
+
+
+def test_no_ridge_is_worth_many_thousand_members_where_longer_ones_pass(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A vase was suggested 13,000 members for the sharp edge of its foot."""
+    tried_at: list[float] = []
+
+    def tried(advice: Advice, length: float, most: int = 0) -> LengthTrial:
+        tried_at.append(length)
+        return trial_of(length, *(("lost",) if length > 0.9 * advice._usual else ()))
+
+    monkeypatch.setattr(Advice, "try_length", tried)
+    advice = Advice(cloud_of("limpet"), st.Settings(length=1.0))
+    below = advice.next_below(advice._usual)
+    assert advice.suggest() == below
+    monkeypatch.setattr(Advice, "members", lambda *_: 12_000)
+    tried_at.clear()
+    advice = Advice(cloud_of("limpet"), st.Settings(length=1.0))
+    assert advice.suggest() == advice._usual and min(tried_at) == advice._usual
+
+
+def test_a_length_whose_grid_climbs_into_trees_gives_way_to_the_next_above_that_stays_on_the_ground(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It closed openings that were none, between ground and crowns; fewer warnings show the right surface."""
+    cut = (LeftOut("limbs", 9, 0.001),)
+
+    def tried(advice: Advice, length: float, most: int = 0) -> LengthTrial:
+        hole = LeftOut("hole", 0, 0.0, size=1.5 * length)
+        if length < 1.1 * advice._usual:
+            return trial_of(length, "closed", "gap", "peak", "lost", left_out=(hole, *cut))
+        return trial_of(length, "peak", "offset", left_out=left_out)
+
+    monkeypatch.setattr(Advice, "try_length", tried)
+    advice = Advice(cloud_of("limpet"), st.Settings(length=1.0))
+    left_out: tuple[LeftOut, ...] = ()
+    assert advice.suggest() == advice.next_above(advice._usual)
+    left_out = cut  # then it is on limbs too
+    assert advice.suggest() == advice._usual
+
+
+def beside_few_points() -> st.PointCloud:
+    """A plate with some outliers beside it, where nothing else is."""
+    few = np.random.default_rng(1).uniform([9.0, -6.0, -2.0], [21.0, 6.0, 2.0], (60, 3))
+    return st.PointCloud.from_array(np.vstack([sheet(16.0, 12.0, 0.25), few]))
+
+
+def test_points_that_look_like_sparse_surface_are_judged_once_a_grid_fails_for_them(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Every other front was tried before, which leaves them out all the same."""
+    made = counted_runs(monkeypatch, lambda length: True)
+    grid = st.grid_from_points(beside_few_points(), st.Settings(length=1.0, effort="quick"))
+    assert known(grid.settings).judge_outliers == "always" and len(made) == 2
+    assert any(warning.kind == "left out" for warning in known(grid.certificate).warnings)
+
+
+def test_the_usual_length_is_tried_again_once_a_longer_one_passes_with_the_outliers_judged(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Of a face no length passed but one with members of which its nose has two."""
+    make_grid, made = pipeline.make_grid, list[tuple[float, str]]()
+
+    def tried(cloud: st.PointCloud, attempt: Attempt, **others: Any) -> st.Grid:
+        made.append((attempt.settings.length, attempt.settings.judge_outliers))
+        if attempt.settings.length <= advice._usual and attempt.settings.judge_outliers == "auto":
+            raise st.FrontError("a member is too short")
+        return make_grid(cloud, attempt, **others)
+
+    advice = Advice(beside_few_points(), st.Settings(length=1.0))
+    monkeypatch.setattr(pipeline, "make_grid", tried)
+    assert advice.suggest() == advice._usual
+    assert made.index((advice._usual, "always")) == 6

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from itertools import chain
 from typing import TYPE_CHECKING
 
 from ..check.limits import with_ridges_given_up, with_ridges_lost
 from ..errors import CertificateError, FrontError, OneSidedError, ScanTrussError
-from .limit import AttemptLimit, fails_by_front, joins_sheets, loses_limbs, only_leaves_out
+from .limit import AttemptLimit, fails_as_sparse, fails_by_front, joins_sheets, loses_limbs, only_leaves_out
 from .looks import (
+    AskedScan,
     breaks_limb,
     follows_more,
     gaps_spanned,
@@ -20,7 +22,7 @@ from .looks import (
 )
 from .lost_ridges import lost_ridges
 from .moved_corners import with_moved_corners
-from .table import AS_ASKED, SECOND_LAYOUT, Attempt, attempts, layouts_of
+from .table import AS_ASKED, SECOND_LAYOUT, Attempt, attempts, judging_outliers, layouts_of
 
 if TYPE_CHECKING:
     from ..grid.grid import Grid
@@ -44,6 +46,8 @@ class AttemptCourse:
     - `RIDGES_GIVEN_UP`: an attempt fails near ridges; each gives up one place more at least, of `FAULTS_WITHOUT_RIDGES`.
     - `WITHOUT_RODS`: a grid passes but runs along rods; once, as the last attempt. That with fewer warnings is taken, or that without
       them where it spans fewer gaps or they are columns of a shell: a grid around some of them is no part of it.
+    - outliers judged: a grid fails as points too far apart lie on much of the surface; the attempt again and all after it with these
+      points judged, as most may be outliers, once. None passes without.
     - `BETWEEN_WALLS`: the first grid passes but may jump between the sides of thin walls; once, as the last attempt. That which follows
       more of the scan is taken.
     - least effort: none passes, and sheets are not too near each other; all attempts again, once: more effort never gives less. Those
@@ -169,6 +173,7 @@ class AttemptCourse:
                 self._follows = replace(attempt, starts=layouts_of(attempt.settings)[SECOND_LAYOUT][0])
             return
         self._fails_by_front &= fails_by_front(fault)
+        is_sparse = fails_as_sparse(fault)
         if isinstance(fault, FrontError):
             self._limit.end(fault)
             self._first_fault = self._first_fault or fault
@@ -180,6 +185,8 @@ class AttemptCourse:
             fault = self._first_fault
         if self._passed is None and self._row_begun is not None:
             self._note(self._row_begun, fault)
+            if is_sparse and AskedScan(self._cloud, self._settings).has_more_outliers(attempt.settings):
+                self._tried = judging_outliers(chain([self._row_begun], self._tried))
 
     def _note(self, attempt: Attempt, fault: ScanTrussError) -> None:
         """Note why no grid of an attempt of the table passes, whatever followed it."""

@@ -44,6 +44,11 @@ def fails_by_front(fault: ScanTrussError) -> bool:
     return isinstance(fault, CertificateError) and bool(_kinds_of(fault) & FAULTS_OF_FRONTS)
 
 
+def fails_as_sparse(fault: ScanTrussError) -> bool:
+    """Whether points too far apart for the members lie on more of the surface than may be missing: with any front."""
+    return isinstance(fault, CertificateError) and "sparse" in _kinds_of(fault)
+
+
 def cuts_everywhere(fault: ScanTrussError | None) -> bool:
     """Whether so many triangles of a grid cut each other that they were not all counted."""
     found = fault.grid.certificate if isinstance(fault, CertificateError) else None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
@@ -252,6 +252,16 @@ def attempts(cloud: PointCloud, settings: Settings, rows: Sequence[AttemptRow] =
                 made.append((tried, starts))
                 yield Attempt(tried, starts, row=row.name)
         now = tried if row.stays else now
+
+
+def judging_outliers(tried: Iterable[Attempt]) -> Iterator[Attempt]:
+    """Yield attempts with the outliers of the scan always judged, each once."""
+    made: list[tuple[Settings, Starts]] = []
+    for attempt in tried:
+        settings = attempt.settings.replace(judge_outliers="always")
+        if (settings, attempt.starts) not in made:
+            made.append((settings, attempt.starts))
+            yield replace(attempt, settings=settings)
 
 
 def _applies(row: AttemptRow, scan: AskedScan, now: Settings) -> bool:

@@ -21,6 +21,7 @@ from ..scan.member_length import exact_range, length_range, round_length
 from ..surface.samples import sample_surface
 from ..surface.size_field import measured_bends
 from . import ladder
+from .following import length_that_follows
 from .length_trial import LengthTrial, settled
 
 if TYPE_CHECKING:
@@ -77,7 +78,10 @@ class Advice:
             Grids that are made at most in this call; a later one goes on from there.
         """
         known = self._found.get(length)
-        if known is not None and (known.passed or not known.paused):
+        if self._is_outdated(length):  # others passed with the outliers judged
+            known = None
+            del self._begun[length]
+        elif known is not None and (known.passed or not known.paused):
             return known
         low, high = exact_range(self._cloud)
         if not low * (1 - 1e-9) <= length <= high * (1 + 1e-9) or self.members(length) > ladder.MOST_MEMBERS:
@@ -116,6 +120,12 @@ class Advice:
         self._found[length] = trial
         return trial
 
+    def _is_outdated(self, length: float) -> bool:
+        """Whether no grid has passed at a length that was tried before the outliers of the scan were judged."""
+        if length not in self._begun or (length in self._found and self._found[length].passed):
+            return False
+        return self._begun[length][0].judge_outliers != self._settings.judge_outliers
+
     def settle(self) -> None:
         """Begin once as `grid` does at each length at which no quick run passes."""
         self._found = {
@@ -143,9 +153,9 @@ class Advice:
 
         It is the first of those tried in turn that passes with what is next above it, both without much of the scan lost; else of
         those that pass with what is next above them the first that loses hardly more than the least; else the next below one that
-        passes, if it passes too; else one that passes, if there is one with another not far above it that passes too; else the usual
-        length. Where none passes, longer ones are looked at once more, then those beside the usual one. One that closes openings or
-        loses ridges gives way to the next shorter one that does not, if that passes and loses no more.
+        passes, if it passes too; else one that passes, if there is one with another not far above it that passes too, and rather
+        one that loses little; else the usual length. Where none passes, longer ones are looked at once more, then those beside the
+        usual one. One that closes openings or loses ridges gives way to one that does not, if that passes and loses no more.
         """
         self.is_spent = True
         low, high = length_range(self._cloud)
@@ -161,6 +171,10 @@ class Advice:
             trial = self.try_length(length, most)
             if trial is None or not trial.passed:
                 continue
+            if self._is_outdated(self._usual):
+                usual = self.try_length(self._usual, most)
+                trial = usual if usual is not None and usual.passed else trial
+                length = trial.length
             above = self.try_length(self.next_above(length), most)
             if above is not None and above.passed:
                 both[length] = max(trial.lost, above.lost)
@@ -183,7 +197,8 @@ class Advice:
             if trial is not None and trial.passed and passing[0] <= ladder.NEARLY_NEXT * below:
                 return below
         followed = [one for one in passing if any(one < other <= ladder.NEARLY_NEXT * one for other in passing)]
-        return min(followed or passing, key=self._far_from_usual, default=self._usual)
+        complete = [one for one in followed if self._found[one].lost <= ladder.MOST_LOST]
+        return min(complete or followed or passing, key=self._far_from_usual, default=self._usual)
 
     def _is_hopeless(self) -> bool:
         """Whether some lengths were tried, and the grids of all of them are far from passing or fail by their fronts."""
@@ -202,27 +217,9 @@ class Advice:
         return shorter[-1].length if trial is not None and trial.passed else length
 
     def _following_more(self, trial: LengthTrial) -> float:
-        """Return the length of a trial that passes, or a shorter one if that follows what this one does not, and loses no more.
-
-        That is openings which this one closes, or ridges which it loses. Lengths between may follow no more, or not pass, as those
-        too long for steps and too short for the slope along them.
-        """
-        if not trial.follows_less:
-            return trial.length
+        """Return the length of a trial that passes, or one that follows what this one does not; see `length_that_follows`."""
         self._count_at(trial.length, ladder.FIRST_TWO * ladder.STEPS_TO_FOLLOW)
-        above, passed_over = trial, 0
-        for _ in range(ladder.STEPS_TO_FOLLOW):
-            below = self.next_below(above.length)
-            shorter = self.try_length(below, ladder.FIRST_TWO) if below < above.length else None
-            if shorter is None or (shorter.passed and shorter.lost > trial.lost + ladder.LOST_ALIKE):
-                break
-            if shorter.passed and above.passed and shorter.follows_less < trial.follows_less:
-                return below
-            passed_over += shorter.passed
-            if passed_over > ladder.PASSED_OVER and trial.follows_less == 1:
-                break
-            above = shorter
-        return trial.length
+        return length_that_follows(self, trial)
 
     def _try_longer(self) -> None:
         """Try longer lengths than the usual one until one passes, with the grids of the table: columns are then seen for what they are.

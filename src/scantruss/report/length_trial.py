@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from ..attempts.looks import has_one_lattice
 from ..attempts.table import Attempt
 from ..errors import FrontError, InputError
+from ..grid.line_sets import RIDGE, sets_of
 from ..pipeline import first_that_passes
 
 if TYPE_CHECKING:
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 
 # kinds of warnings of what shorter members may follow
 CRUSHED_OR_LOST = ("crushed", "lost")
+OPENINGS_AND_LIMBS = ("hole", "gap", "limbs")  # kinds of what a grid leaves out
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,6 +56,23 @@ class LengthTrial:
         if self.grid is None or self.grid.certificate is None:
             return 1.0
         return self.grid.certificate.judged_out
+
+    @property
+    def warnings(self) -> int:
+        """How many warnings the certificate of the grid has."""
+        found = self.grid.certificate if self.grid is not None else None
+        return 0 if found is None else len(found.warnings)
+
+    @property
+    def ridges_followed(self) -> float:
+        """How long the ridges are that the grid follows [scan unit]."""
+        return 0.0 if self.grid is None else sum(each["length"] for each in sets_of(self.grid, RIDGE))
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether the grid closes no opening and cuts off no limb."""
+        found = self.grid.certificate if self.grid is not None else None
+        return found is not None and not any(part.kind in OPENINGS_AND_LIMBS for part in found.left_out)
 
     @property
     def follows_less(self) -> int:
