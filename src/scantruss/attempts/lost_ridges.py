@@ -65,7 +65,7 @@ def lost_ridges(
     finer = max(FINER * length, FEWEST_SPACINGS_OF_FINER * cloud.spacing)
     if finer > COARSEST_FINER * length or not _may_cut_folds(grid, cloud, made, length):
         return []
-    known = np.concatenate([_places_on_chains(grid), *(part - cloud.origin for part in given_up)])
+    known = np.concatenate([places_on_chains(grid), *(part - cloud.origin for part in given_up)])
     found: list[np.ndarray] = []
     is_deep = False
     looked = made.replace(length_field="", ridge_angle=asked.ridge_angle, limb_girth=0.0)
@@ -131,7 +131,7 @@ def _is_away(places: np.ndarray, known: np.ndarray, length: float) -> np.ndarray
     return away
 
 
-def _places_on_chains(grid: Grid) -> np.ndarray:
+def places_on_chains(grid: Grid) -> np.ndarray:
     """Return places along the chains of the ridges that a grid follows (K, 3)."""
     chains = [grid.nodes[np.array(each["nodes"], np.int64)] for each in sets_of(grid, RIDGE)]
     shares = np.linspace(0.0, 1.0, PLACES_ON_MEMBER)[:, None, None]

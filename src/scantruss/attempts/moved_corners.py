@@ -9,10 +9,11 @@ import numpy as np
 
 from ..check.limits import PLACES_KEPT
 from ..constraints.find import wanted_ridges
+from ..constraints.ridges import ONE_CORNER
 from ..errors import ScanTrussError, words_of_number
 from ..grid.certificate import Fault, place_of
-from ..grid.line_sets import RIDGE, sets_of
 from ..surface.samples import sample_surface
+from .lost_ridges import places_on_chains
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -23,11 +24,9 @@ if TYPE_CHECKING:
     from ..settings import Settings
 
 CORNER_MOVED = 0.25  # distance of the nearest node from which on a corner is moved [member lengths]
-ENDS_IN_CORNER = 0.1  # distance of the ends of ridges within which they meet in a corner [member lengths]
 # how far from its corner a ridge is followed or not, and distance from the grid's ridges within which it is [member lengths]
 FOLLOWED_FROM, FOLLOWED_WITHIN = 1.0, 0.3
 CLEAR_OF_BOUNDARY = 0.75  # distance of a corner from the boundary, where ridges end at that [member lengths]
-STEPS_OF_MEMBER = 8
 
 
 def with_moved_corners(grid: Grid, cloud: PointCloud, asked: Settings, wide: tuple[int, ...] = ()) -> Grid:
@@ -67,10 +66,9 @@ def moved_corners(grid: Grid, ridges: Sequence[Ridge], length: float) -> list[tu
     ridges : those of the scan
     length : desired member length, where the grid has none of its own at each node [scan unit]
     """
-    chains = [grid.nodes[np.array(each["nodes"], np.int64)] for each in sets_of(grid, RIDGE)]
-    if not chains:
+    followed = places_on_chains(grid)
+    if not len(followed):
         return []
-    followed = np.concatenate([_places_along(chain) for chain in chains])
     outer = grid.nodes[grid.edges[grid.edge_uses == 1].ravel()]
     ends = [(ridge, at, ridge.places[at]) for ridge in ridges if not ridge.ring for at in (0, -1)]
     found: list[tuple[float, np.ndarray]] = []
@@ -79,7 +77,7 @@ def moved_corners(grid: Grid, ridges: Sequence[Ridge], length: float) -> list[tu
         away = _gap(grid.nodes, place)
         if away <= CORNER_MOVED * member or any(np.linalg.norm(place - other) < member / 2 for _, other in found):
             continue
-        here = [each for each in ends if np.linalg.norm(each[2] - place) < ENDS_IN_CORNER * member]
+        here = [each for each in ends if np.linalg.norm(each[2] - place) < ONE_CORNER * member]
         led = [_gap(followed, _inwards(one, at, member)) < FOLLOWED_WITHIN * member for one, at, _ in here]
         on_boundary = len(outer) and _gap(outer, place) < CLEAR_OF_BOUNDARY * member
         if len({id(one) for one, _, _ in here} | {id(ridge)}) > 1 and all(led) and not on_boundary:
@@ -103,10 +101,3 @@ def _inwards(ridge: Ridge, at: int, member: float) -> np.ndarray:
     arc = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
     way = min(FOLLOWED_FROM * member, 0.5 * arc[-1])
     return np.array([np.interp(way, arc, line[:, axis]) for axis in range(3)])
-
-
-def _places_along(chain: np.ndarray) -> np.ndarray:
-    """Return places on the members of a chain of nodes (K, 3)."""
-    shares = np.linspace(0.0, 1.0, STEPS_OF_MEMBER)[:, None, None]
-    places: np.ndarray = (chain[:-1] + shares * np.diff(chain, axis=0)).reshape(-1, 3)
-    return places if len(chain) > 1 else chain

@@ -220,7 +220,7 @@ def _find_loops(samples: SurfaceSamples, settings: Settings) -> tuple[list[Loop]
             found.append((curve, piece, bias, tips))
     found = [each for each in found if not _at_ring(each[0], samples, length)]
     bridged = [curve for curve in bridged if not _at_ring(curve, samples, length)]
-    smoothed = [smooth_loop(*each[:3], settings, whole, each[3]) for each in found]
+    smoothed = [smooth_loop(curve, piece, bias, settings, whole, tips) for curve, piece, bias, tips in found]
     bridged += [curve for (curve, *_), loop in zip(found, smoothed, strict=True) if loop is None]
     return [loop for loop in smoothed if loop is not None], bridged
 

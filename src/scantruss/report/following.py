@@ -51,9 +51,9 @@ def _shorter_that_follows(advice: Advice, trial: LengthTrial) -> float:
     Lengths between may follow no more, or not pass, as those too long for steps and too short for the slope along them.
     """
     above, passed_over, all_pass = trial, 0, True
+    only_ridges = trial.follows_less == 1
     for _ in range(STEPS_TO_FOLLOW):
         below = advice.next_below(above.length)
-        only_ridges = trial.follows_less == 1
         if only_ridges and all_pass and advice.members(below) > MEMBERS_FOR_RIDGES:
             break
         shorter = advice.try_length(below, FIRST_TWO) if below < above.length else None

@@ -77,9 +77,8 @@ def count_numbers(row: Sequence[str], comma: bool) -> int:
 
 def holds_three(row: Sequence[str], comma: bool) -> bool:
     """Return whether three fields or more are numbers, or words for missing ones: of a long row the first three are enough."""
-    if len(row) < 3:
-        return False
-    return next(islice(filter(None, (is_number(field, comma) for field in row)), 2, None), False)
+    numbers = (field for field in row if is_number(field, comma))
+    return len(list(islice(numbers, 3))) == 3
 
 
 def holds_numbers(row: Sequence[str], comma: bool) -> bool:
