@@ -14,7 +14,16 @@ from small_clouds import ball, cap, sheet
 import scantruss as st
 from scantruss.attempts.course import RIDGES_GIVEN_UP, WITHOUT_RODS, AttemptCourse
 from scantruss.attempts.limit import MOST_RUNS
-from scantruss.attempts.table import AS_ASKED, ROWS_TRIED, TURNED_ROWS, Attempt, AttemptRow, attempts
+from scantruss.attempts.table import (
+    AS_ASKED,
+    PLAIN_BODY,
+    ROWS_OF_TRIALS,
+    ROWS_TRIED,
+    TURNED_ROWS,
+    Attempt,
+    AttemptRow,
+    attempts,
+)
 from scantruss.errors import FrontError
 from scantruss.grid.certificate import LeftOut
 from scantruss.surface import samples
@@ -54,6 +63,16 @@ def test_each_row_has_a_name_of_its_own_and_the_first_changes_nothing() -> None:
     assert len(set(NAMES)) == len(NAMES)
     first = ROWS_TRIED[0]
     assert first.name == AS_ASKED and not first.changes and not first.shares
+
+
+def test_a_trial_of_a_body_comes_to_the_plain_one_before_other_fronts_and_with_the_usual_effort() -> None:
+    """Two grids are made of some lengths: of a figure with limbs a second front of all of it would be the other one."""
+    names = [row.name for row in ROWS_OF_TRIALS]
+    assert sorted(names) == sorted(row.name for row in ROWS_TRIED)
+    ahead = [row for row in ROWS_OF_TRIALS[: names.index(PLAIN_BODY)] if row.fronts != slice(0, 1)]
+    assert all(row.name.startswith(("hall", "thin walls")) for row in ahead)
+    efforts = {row.name: row.changed(st.Settings(length=1.0, effort="quick")).effort for row in ROWS_OF_TRIALS}
+    assert efforts.pop(PLAIN_BODY) == "normal" and set(efforts.values()) == {"quick"}
 
 
 @pytest.mark.parametrize("name", CLOUDS)

@@ -1,6 +1,7 @@
 """Sites: the scan at the scale of a member, with oriented normals and links that stay on one sheet."""
 
 import gc
+from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 
 import naive
@@ -421,3 +422,25 @@ def test_a_pit_faces_up_where_z_is_up_and_else_away_from_its_centre(unit: str, u
     samples = sample_surface(PointCloud.from_array(pit, unit=unit), Settings(length=1.5))
     facing = samples.surface.normals[:, 2]
     assert ((facing > 0.0) == upwards).all()
+
+
+def test_threads_that_work_on_one_scan_share_no_scratch_arrays() -> None:
+    """Two browsers that open one scan, or a caller with a thread for each length, work on it at the same time."""
+    cloud, chosen = PointCloud.from_array(make("cloth", 4000).points), Settings(length=25.0)
+    own = sample_surface(cloud, chosen).surface
+    with ThreadPoolExecutor(1) as other:
+        first, again = (other.submit(lambda: sample_surface(cloud, chosen).surface).result() for _ in range(2))
+    assert first is again and sample_surface(cloud, chosen).surface is own
+    for name in ("stamp", "queue", "counter"):
+        assert not np.shares_memory(getattr(own, name), getattr(first, name)), name
+    np.testing.assert_array_equal(first.mean, own.mean)
+
+
+def test_grids_of_one_scan_that_threads_make_at_once_are_the_same() -> None:
+    cloud, chosen = PointCloud.from_array(make("cloth", 4000).points), Settings(length=25.0)
+    alone = grid_from_points(cloud, chosen)
+    with ThreadPoolExecutor(3) as pool:
+        grids = list(pool.map(lambda _: grid_from_points(cloud, chosen), range(3)))
+    for grid in grids:
+        np.testing.assert_array_equal(grid.nodes, alone.nodes)
+        np.testing.assert_array_equal(grid.triangles, alone.triangles)

@@ -27,7 +27,8 @@ if TYPE_CHECKING:
     from ..settings import Settings
     from ..surface.samples import SurfaceSamples
 
-AS_ASKED, ROWS_TURNED, PLAIN_BODY = "as asked", "rows turned", "plain body"  # names of rows
+# names of rows
+AS_ASKED, WITHOUT_ROWS, ROWS_TURNED, PLAIN_BODY = "as asked", "front without rows", "rows turned", "plain body"
 # lengths of the fronts without rows, in desired lengths, tried in turn where no other passes
 FRONT_LENGTHS = (1.0, 0.97, 1.04)
 TURNED_ROWS = (40.0, 10.0, 50.0)  # angles of the lattice that are tried instead of the usual one [degree]
@@ -195,7 +196,7 @@ ROWS_TRIED: tuple[AttemptRow, ...] = (
         lambda scan, now: not now.box_size and (now.thin_walls or scan.has_thin_walls),
         {"thin_walls": True, "box_size": SAMPLE_SPACING},
     ),
-    AttemptRow("front without rows", SECOND_LAYOUT),
+    AttemptRow(WITHOUT_ROWS, SECOND_LAYOUT),
     AttemptRow(ROWS_TURNED, TURNED_ROWS, lambda scan, now: has_one_lattice(scan.cloud, now)),
     # where edges, limbs or slits are in the way, other fronts seldom help
     AttemptRow("sharp edges", FIRST_LAYOUT, lambda scan, now: scan.has_sharp_edges, {"sharp_edges": True}),
@@ -224,15 +225,23 @@ ROWS_TRIED: tuple[AttemptRow, ...] = (
 )  # fmt: skip
 
 
-def _moved(rows: tuple[AttemptRow, ...], name: str, behind: str) -> tuple[AttemptRow, ...]:
-    """Return the rows, one of them moved behind another."""
-    rest = [row for row in rows if row.name != name]
-    at = next(k for k, row in enumerate(rest) if row.name == behind) + 1
-    return (*rest[:at], *(row for row in rows if row.name == name), *rest[at:])
+def _rows_of_trials() -> tuple[AttemptRow, ...]:
+    """Return the rows for a few grids that show whether a length passes.
+
+    Of a body with thin limbs it is the plain body that does, if any, and seldom one of another front; with so little as the other trials
+    are given it fails where a grid of usual effort passes.
+    """
+    moved = [row for row in ROWS_TRIED if row.name in (WITHOUT_ROWS, ROWS_TURNED)]
+    rows = []
+    for row in ROWS_TRIED:
+        if row.name == PLAIN_BODY:
+            rows += [replace(row, changes={**row.changes, "effort": "normal"}), *moved]
+        elif row not in moved:
+            rows.append(row)
+    return tuple(rows)
 
 
-#: the same for a few grids that show whether a length passes: of a body with thin limbs seldom one of turned rows does
-ROWS_OF_TRIALS = _moved(ROWS_TRIED, ROWS_TURNED, behind=PLAIN_BODY)
+ROWS_OF_TRIALS = _rows_of_trials()
 
 
 def attempts(cloud: PointCloud, settings: Settings, rows: Sequence[AttemptRow] = ROWS_TRIED) -> Iterator[Attempt]:

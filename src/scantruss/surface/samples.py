@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import weakref
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -39,6 +38,7 @@ from .of_cloud import cloud_has_outliers, lone_of_cloud
 from .owners import owners_of
 from .pieces import by_size, chosen_pieces, large_pieces, number_pieces, places_to_count, sample_areas
 from .rods_at_lengths import points_of_rods
+from .scratch import KeptSamples
 from .shape import check_is_surface, layers_of_surface
 from .size_field import length_field
 from .thin_walls import normals_of_walls
@@ -167,11 +167,11 @@ class SurfaceSamples:
         return is_graded(self.surface)
 
 
-_SAMPLES_OF_CLOUDS: weakref.WeakKeyDictionary[PointCloud, dict[Asked, SurfaceSamples]] = weakref.WeakKeyDictionary()
+_KEPT = KeptSamples()
 
 
 def sample_surface(cloud: PointCloud, settings: Settings) -> SurfaceSamples:
-    """Return the samples of a cloud for a member length, in search boxes (Eq. 1); the last are kept as long as the cloud lives.
+    """Return the samples of a cloud for a member length, in search boxes (Eq. 1); each thread keeps the last while the cloud lives.
 
     Parameters
     ----------
@@ -183,7 +183,7 @@ def sample_surface(cloud: PointCloud, settings: Settings) -> SurfaceSamples:
     asked = Asked.of(settings, cloud.origin, cloud.z_is_up)
     if asked.outlier_distance and not asked.judge_always:
         asked = asked._replace(judge_always=cloud_has_outliers(cloud))
-    kept = _SAMPLES_OF_CLOUDS.setdefault(cloud, {})
+    kept = _KEPT.of_clouds.setdefault(cloud, {})
     found = kept.pop(asked, None) or _samples_of(cloud, asked, kept)
     kept[asked] = found  # the one used last is the last to go
     return found

@@ -2,9 +2,25 @@
 
 from __future__ import annotations
 
+from threading import local
+from typing import TYPE_CHECKING
+from weakref import WeakKeyDictionary
+
 import numpy as np
 
 from ..kernels.surface.local_surface import Surface
+
+if TYPE_CHECKING:
+    from ..scan.cloud import PointCloud
+    from .chosen_samples import Asked
+    from .samples import SurfaceSamples
+
+
+class KeptSamples(local):
+    """The samples of clouds that are kept, by each thread its own: in their scratch arrays two threads would write at once."""
+
+    def __init__(self) -> None:
+        self.of_clouds: WeakKeyDictionary[PointCloud, dict[Asked, SurfaceSamples]] = WeakKeyDictionary()
 
 
 def with_own_scratch(surface: Surface) -> Surface:
