@@ -14,10 +14,10 @@ from scantruss.kernels.mesh.point_location import facing_sample
 from scantruss.scan.cloud import PointCloud
 from scantruss.surface.samples import sample_surface
 
-RADIUS = 6.0  # of a bowl, in members of length 1
+RADIUS = 5.0  # of a bowl, in members of length 1
 
 
-def bowl(wall: float, rounded: bool, noise: float = 0.0, count: int = 50_000) -> np.ndarray:
+def bowl(wall: float, rounded: bool, noise: float = 0.0, count: int = 35_000) -> np.ndarray:
     """Points (N, 3) on a half ball with a wall, and a lip that is flat or round."""
     rng = np.random.default_rng(7)
     down = np.linspace(-0.5 * np.pi, 0.0, 80)
