@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING
 
 from ..check.limits import with_ridges_given_up, with_ridges_lost
 from ..errors import CertificateError, FrontError, OneSidedError, ScanTrussError
+from ..improve.longer_search import is_no_worse
 from .limit import AttemptLimit, fails_as_sparse, fails_by_front, joins_sheets, loses_limbs, only_leaves_out
 from .looks import (
+    POOR_MEMBERS,
     AskedScan,
     breaks_limb,
     follows_more,
@@ -34,8 +36,12 @@ WITHOUT_RODS = "passes, but along rods: without them"
 BETWEEN_WALLS = "passes, but jumps between thin walls: with their sides distinguished"
 BREAKS_LIMB = "the grid is torn at a limb thinner than its members"
 RIDGES_GIVEN_UP = "ridges given up near the faults"
+WITHOUT_DOUBTFUL_RIDGES = "passes, but ends ridges where they go on: without any"
 # rows of grids that pass before the sides of walls were ever distinguished
 TRIED_BEFORE_WALLS = (AS_ASKED, RIDGES_GIVEN_UP)
+
+# attempts that are made after one that passes, and when their grids are taken in its place
+IS_BETTER = {BETWEEN_WALLS: follows_more, WITHOUT_DOUBTFUL_RIDGES: is_no_worse}
 
 
 class AttemptCourse:
@@ -50,6 +56,8 @@ class AttemptCourse:
       points judged, as most may be outliers, once. None passes without.
     - `BETWEEN_WALLS`: the first grid passes but may jump between the sides of thin walls; once, as the last attempt. That which follows
       more of the scan is taken.
+    - `WITHOUT_DOUBTFUL_RIDGES`: a grid passes with ridges given up or broken off, as along a round tube; once, as the last attempt.
+      That which is as even, as regular and as near to the scan is taken.
     - least effort: none passes, and sheets are not too near each other; all attempts again, once: more effort never gives less. Those
       are left out that fail by their one front, which is the same with any effort, or by the limbs that were cut off before it.
 
@@ -136,9 +144,9 @@ class AttemptCourse:
         lost = lost_ridges(grid, self._cloud, self._settings, given_up)
         grid = with_moved_corners(grid, self._cloud, self._settings, attempt.wide)
         grid = with_ridges_lost(with_ridges_given_up(grid, given_up), lost)
-        if attempt.row == BETWEEN_WALLS:
+        if attempt.row in IS_BETTER:
             assert self._passed is not None
-            self._passed = grid if follows_more(grid, self._passed) else self._passed
+            self._passed = grid if IS_BETTER[attempt.row](grid, self._passed) else self._passed
             return
         if self._passed is not None:  # this one is without rods
             found, known = grid.certificate, self._passed.certificate
@@ -158,6 +166,9 @@ class AttemptCourse:
             self._follows = Attempt(
                 self._settings.replace(thin_walls=True), is_trial=attempt.is_trial, row=BETWEEN_WALLS
             )
+        elif _doubts_ridges(grid) and not attempt.is_trial:
+            without = attempt.settings.replace(ridge_angle=0.0)
+            self._follows = Attempt(without, row=WITHOUT_DOUBTFUL_RIDGES)
         self._passed = grid
 
     def failed(self, attempt: Attempt, fault: ScanTrussError) -> None:
@@ -168,6 +179,8 @@ class AttemptCourse:
         ScanTrussError
             The fault, where it is one of the settings that were asked for.
         """
+        if attempt.row == WITHOUT_DOUBTFUL_RIDGES:
+            return
         if attempt.row == BETWEEN_WALLS:
             if attempt.starts is None:  # once more, with a front that makes all of its nodes itself
                 self._follows = replace(attempt, starts=layouts_of(attempt.settings)[SECOND_LAYOUT][0])
@@ -226,3 +239,9 @@ class AttemptCourse:
         if self._advice and isinstance(worst, FrontError) and not only_leaves_out(worst):
             return type(worst)(f"{worst}; {self._advice}", worst.grid, worst.where)
         return worst
+
+
+def _doubts_ridges(grid: Grid) -> bool:
+    """Whether a grid gives up ridges or breaks them off, and has poor members: they may be none."""
+    kinds = {warning.kind for warning in grid.certificate.warnings} if grid.certificate is not None else set()
+    return "ridge" in kinds and bool(kinds & POOR_MEMBERS)
