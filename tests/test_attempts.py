@@ -240,7 +240,6 @@ def test_a_grid_that_gives_up_ridges_is_followed_by_one_without_any_and_the_bett
 ) -> None:
     course_of = "scantruss.attempts.course."
     first, without = _any_grid(), _any_grid()
-    monkeypatch.setattr(Attempt, "ridges_given_up", lambda *_: [])
     monkeypatch.setattr(course_of + "lost_ridges", lambda *_: [])
     for name in ("with_moved_corners", "with_ridges_lost", "with_ridges_given_up"):
         monkeypatch.setattr(course_of + name, lambda grid, *_: grid)
