@@ -23,6 +23,8 @@ FLAGS = """
 --disable-component-update --disable-breakpad --disable-sync --disable-popup-blocking --hide-scrollbars --mute-audio
 --force-color-profile=srgb --password-store=basic about:blank
 """.split()  # drawn by software
+# of a window: drawn by software, the smaller the sooner; and of one whose drawing is looked at or clicked on [pixel]
+WINDOW, LARGE_WINDOW = {"width": 700, "height": 420}, {"width": 1280, "height": 720}
 PATIENCE = 120.0  # of a machine that is busy with other tests: until a browser is there, and of each thing that is waited for in it [s]
 
 
@@ -77,8 +79,8 @@ def close_chromium() -> None:
 
 
 @contextmanager
-def open_page(address: str) -> Iterator[tuple[Any, list[str]]]:
-    """Open an address; give the page and a list to which its errors are added. Skip where there is no browser."""
+def open_page(address: str, size: dict[str, int] = WINDOW) -> Iterator[tuple[Any, list[str]]]:
+    """Open an address in a window of some size; give the page and a list to which its errors are added. Skip where there is no browser."""
     playwright = pytest.importorskip("playwright.sync_api", reason="Playwright is not installed")
     if chromium().has_ended:
         close_chromium()
@@ -86,7 +88,7 @@ def open_page(address: str) -> Iterator[tuple[Any, list[str]]]:
     with playwright.sync_playwright() as started:
         browser = started.chromium.connect_over_cdp(at)
         try:
-            context = browser.new_context(viewport={"width": 1280, "height": 720})
+            context = browser.new_context(viewport=size)
             context.set_default_timeout(1000 * PATIENCE)
             page = context.new_page()
             errors: list[str] = []

@@ -18,8 +18,12 @@ import pytest
 from browser import close_chromium
 from hypothesis import settings
 
+from scantruss.runtime.memory import RARELY
+
 settings.register_profile("scantruss", deadline=None, derandomize=True, print_blob=True)
 settings.load_profile("scantruss")
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # of each worker: as many as there are processors share them
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -43,6 +47,7 @@ def pytest_collection() -> Generator[None, object, object]:
         return (yield)
     finally:
         gc.freeze()
+        gc.set_threshold(RARELY)  # so that no command sets it aside again
         gc.enable()
 
 

@@ -199,7 +199,7 @@ def sampled(
     return Shape(
         name=name,
         points=np.ascontiguousarray(motion(points)),
-        surface=surface.moved(motion),
+        surface=surface.moved(motion) if pose or scale != 1.0 or any(offset) else surface,
         length=truth.length * scale,
         noise=noise * scale,
         corners=motion(truth.corners),

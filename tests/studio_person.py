@@ -21,7 +21,6 @@ from scantruss.studio.session import Session
 PORTS = range(
     20_000, 32_000
 )  # none of those that a system gives to whoever connects, which would take one while its server is away
-SMALL = {"width": 700, "height": 420}  # of a window: drawn by software, the smaller the sooner [pixel]
 
 
 def free_port() -> int:

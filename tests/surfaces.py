@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
 Lift = Callable[[Floats], Floats]
 
 
@@ -71,7 +72,7 @@ class Surface:
     @cached_property
     def euler(self) -> int:
         """V - E + T, of the nodes that have a triangle."""
-        return len(np.unique(self.triangles)) - len(self.edges[0]) + len(self.triangles)
+        return int(self._is_used.sum()) - len(self.edges[0]) + len(self.triangles)
 
     @cached_property
     def components(self) -> int:
@@ -81,7 +82,14 @@ class Surface:
 
         edges, _ = self.edges
         graph = coo_matrix((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(len(self.nodes),) * 2)
-        return len(np.unique(connected_components(graph, directed=False)[1][np.unique(self.triangles)]))
+        return len(np.unique(connected_components(graph, directed=False)[1][self._is_used]))
+
+    @cached_property
+    def _is_used(self) -> Bools:
+        """(V,) whether a node has a triangle."""
+        used = np.zeros(len(self.nodes), bool)
+        used[self.triangles] = True
+        return used
 
     @cached_property
     def _tree(self) -> Any:

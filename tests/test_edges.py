@@ -24,7 +24,7 @@ from scantruss.kernels.surface.local_surface import Surface
 from scantruss.surface.samples import SurfaceSamples
 
 
-def groin_vault(rise: float, noise: float = 0.02, half: float = 36.0, count: int = 60_000, seed: int = 0) -> np.ndarray:
+def groin_vault(rise: float, noise: float = 0.02, half: float = 36.0, count: int = 25_000, seed: int = 0) -> np.ndarray:
     """Two barrels that cross over a square: creases along both diagonals."""
     rng = np.random.default_rng(seed)
     x, y = rng.uniform(-half, half, (2, count))
@@ -34,7 +34,7 @@ def groin_vault(rise: float, noise: float = 0.02, half: float = 36.0, count: int
 
 
 def folded(
-    step: float, height: float, saw: float = 0.5, noise: float = 0.05, count: int = 40_000, seed: int = 0
+    step: float, height: float, saw: float = 0.5, noise: float = 0.05, count: int = 20_000, seed: int = 0
 ) -> np.ndarray:
     """A plate of parallel folds; with saw near 0 or 1 a sawtooth roof."""
     rng = np.random.default_rng(seed)

@@ -1,11 +1,19 @@
 """Scans with the faults of real ones, at default settings: the right topology, on the true surface."""
 
+from functools import lru_cache
+
 import numpy as np
 import pytest
 from hard_scans import HARD, hard
 from marks import compiled_only
+from shapes import Shape
 
 import scantruss as st
+
+
+@lru_cache(maxsize=1)
+def scanned(name: str) -> Shape:
+    return hard(name, 0)
 
 
 @compiled_only
@@ -13,7 +21,7 @@ import scantruss as st
 @pytest.mark.parametrize("name", HARD)
 def test_topology_and_distance(name: str, method: str) -> None:
     """Nodes off the boundary lie within half the noise of the true surface on average (.003 members where there is hardly any)."""
-    shape = hard(name, 0)
+    shape = scanned(name)
     settings = st.Settings(length=shape.length, effort="quick", method=method)
     if method == "paper":  # it merges nodes as they come and sets members no limits
         settings = settings.replace(min_length=0.2, max_length=2.5, min_angle=5.0, max_offset=0.5)

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from browser import PATIENCE, open_page
+from browser import LARGE_WINDOW, PATIENCE, open_page
 from PIL import Image
 from studio_person import choose, field, served_dome, tab, tick, until
 
@@ -39,7 +39,7 @@ def saved(page: Any, button: str, place: Path) -> Path:
 
 
 def test_a_person_makes_quads_and_a_double_layer(tmp_path: Path) -> None:
-    with served_dome(tmp_path) as (address, session, _), open_page(address) as (page, errors):
+    with served_dome(tmp_path) as (address, session, _), open_page(address, LARGE_WINDOW) as (page, errors):
         page.wait_for_selector("text=Generate")
         tab(page, "Grid")
         tick(page, "draw panels", False)

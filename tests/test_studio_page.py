@@ -15,10 +15,9 @@ import numpy as np
 import openpyxl
 import pytest
 import trimesh
-from browser import PATIENCE, open_page
+from browser import LARGE_WINDOW, PATIENCE, WINDOW, open_page
 from PIL import Image
 from studio_person import (
-    SMALL,
     choose,
     click_corners,
     drag,
@@ -195,7 +194,7 @@ FAINT = """() => {  // what is written with less contrast than 4.5 to 1 (WCAG 2.
 
 def test_a_person_makes_a_grid_and_a_structure(served: tuple[str, Session, Any], tmp_path: Path) -> None:
     address, session, pages = served
-    with open_page(address) as (page, errors):
+    with open_page(address, LARGE_WINDOW) as (page, errors):
         asked: list[Any] = []
         page.on("request", lambda request: asked.append(request.url))
         page.wait_for_selector("text=Generate")
@@ -347,7 +346,6 @@ def test_a_server_that_is_killed_loses_nothing_but_what_it_was_at(killable: Serv
     write_dome(tmp_path, 120)
     killable.begin("dome.xyz")
     with open_page(killable.address) as (page, _):
-        page.set_viewport_size(SMALL)
         page.wait_for_selector("text=Generate")
         choose(page, "not known", "m")
         tab(page, "Design")
@@ -403,7 +401,7 @@ def test_the_time_of_what_runs_goes_on_while_the_server_says_nothing(served: tup
 
 def test_a_click_on_what_is_said_on_the_drawing_reaches_the_drawing(served: tuple[str, Session, Any]) -> None:
     address, session, pages = served
-    with open_page(address) as (page, errors):
+    with open_page(address, LARGE_WINDOW) as (page, errors):
         page.wait_for_selector("text=Generate")
         assert session.worker.wait(PATIENCE)
         page.click("text=Crop >> nth=0")
@@ -451,7 +449,7 @@ NOTE_FOCUS = """() => {
 
 def test_keys_alone_reach_everything(served: tuple[str, Session, Any]) -> None:
     address, session, _ = served
-    with open_page(address) as (page, errors):
+    with open_page(address, LARGE_WINDOW) as (page, errors):
         page.wait_for_selector("text=Generate")
         assert session.worker.wait(PATIENCE)
         page.evaluate("() => { window.seen = new Set(); }")
@@ -491,7 +489,7 @@ def test_keys_alone_reach_everything(served: tuple[str, Session, Any]) -> None:
 
 def test_what_goes_is_shown_within_the_scan(served: tuple[str, Session, Any]) -> None:
     address, session, _ = served
-    with open_page(address) as (page, errors):
+    with open_page(address, LARGE_WINDOW) as (page, errors):
         page.wait_for_selector("text=Generate")
         assert until(lambda: session.grid is not None) and session.worker.wait(PATIENCE)
         tab(page, "Grid")
@@ -531,9 +529,8 @@ def test_a_tap_is_a_click(served: tuple[str, Session, Any]) -> None:
 def test_two_browsers_have_a_project_each(served: tuple[str, Session, Any]) -> None:
     address, session, _ = served
     with open_page(address) as (page, errors):
-        page.set_viewport_size(SMALL)
         page.wait_for_selector("text=dome.scantruss")
-        other = page.context.browser.new_page(viewport=SMALL)
+        other = page.context.browser.new_page(viewport=WINDOW)
         other.set_default_timeout(1000 * PATIENCE)
         other.goto(address)
         other.wait_for_selector("text=dome-2.scantruss")

@@ -13,7 +13,7 @@ from threading import Event
 from typing import Any
 
 import pytest
-from browser import PATIENCE, open_page
+from browser import LARGE_WINDOW, PATIENCE, open_page
 from studio_dome import done, session_of_dome
 from studio_person import field, served_dome, served_session, tab, until
 
@@ -77,7 +77,7 @@ def test_a_press_counts_though_a_run_begins_or_is_refused_meanwhile(served: tupl
 
 def test_a_press_means_the_control_that_it_began_on(served: tuple[str, Session, Any]) -> None:
     address, session, _ = served
-    with open_page(address) as (page, errors):
+    with open_page(address, LARGE_WINDOW) as (page, errors):
         page.wait_for_selector("text=Generate")
         assert session.worker.wait(PATIENCE)
         page.wait_for_selector("text=ready")

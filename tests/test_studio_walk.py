@@ -9,9 +9,9 @@ from typing import Any
 from urllib.parse import urlsplit
 
 import numpy as np
-from browser import PATIENCE, open_page
+from browser import LARGE_WINDOW, PATIENCE, open_page
 from PIL import Image
-from studio_person import SMALL, choose, click_corners, field, served_dome, tab, tick, until, until_drawn
+from studio_person import choose, click_corners, field, served_dome, tab, tick, until, until_drawn
 
 from scantruss.grid.marks import node_marks
 from scantruss.studio.browsers import Browsers
@@ -127,7 +127,7 @@ def test_progress_and_steps_stay_in_sight_and_draw_scan_as_set(tmp_path: Path) -
 
 
 def test_undo_drops_the_last_corner_of_a_polygon_and_one_that_crosses_itself_is_refused(tmp_path: Path) -> None:
-    with served_dome(tmp_path) as (address, session, pages), open_page(address) as (page, errors):
+    with served_dome(tmp_path) as (address, session, pages), open_page(address, LARGE_WINDOW) as (page, errors):
         ready(page, session)
         session.measure(((1.0, 1.0, 1.0), (2.0, 2.0, 1.0)))
         page.click("text=Crop")
@@ -149,7 +149,6 @@ def test_undo_drops_the_last_corner_of_a_polygon_and_one_that_crosses_itself_is_
 
 def test_a_page_says_when_the_server_has_gone_and_goes_on_when_it_is_back(tmp_path: Path) -> None:
     with served_dome(tmp_path) as (address, session, pages), open_page(address) as (page, errors):
-        page.set_viewport_size(SMALL)
         ready(page, session)
         tab(page, "Design")
         with page.expect_response("**/alive"):
@@ -175,7 +174,6 @@ def test_a_page_says_when_the_server_has_gone_and_goes_on_when_it_is_back(tmp_pa
 def test_a_page_is_not_written_to_once_its_server_has_stopped(tmp_path: Path) -> None:
     """A slider that is set calls what listens to it, of which viser then waits for nothing on a server that is no more."""
     with served_dome(tmp_path) as (address, session, pages), open_page(address) as (page, errors):
-        page.set_viewport_size(SMALL)
         ready(page, session)
         length, ended = session.settings.length, Event()
 

@@ -42,6 +42,7 @@ def goes_on_within(around: np.ndarray, samples: SurfaceSamples, off_grid: np.nda
     near = np.flatnonzero((np.abs(samples.scan - middle) <= reach).all(axis=1) & (samples.judged == KEPT))
     off = (samples.scan[near] - middle) @ axes.T
     level = np.abs(off[:, 2]) <= NEAR_HOLE * length
+    level &= off_grid[near] > OFF_GRID * FROM_EDGE * length  # few are: only those are looked at more closely
     points, away = off[level][:, :2], off_grid[near[level]]
     points = points[away > OFF_GRID * np.maximum(_distance_from_ring(points, edge), FROM_EDGE * length)]
     within = max(GOES_ON_WITHIN * length, SPACINGS_FILLED * samples.spacing)

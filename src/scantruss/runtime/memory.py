@@ -33,10 +33,10 @@ def nothing_collected() -> Iterator[None]:
 @contextmanager
 def made_before_set_aside() -> Iterator[None]:
     """Search only what is made meanwhile for cycles, and rarely: what was imported stays, as does most that a kernel is loaded with."""
-    if gc.get_freeze_count():  # by a block around this one
+    often = gc.get_threshold()
+    if often[0] == RARELY:  # by a block around this one
         yield
         return
-    often = gc.get_threshold()
     gc.freeze()
     gc.set_threshold(RARELY)
     try:

@@ -130,7 +130,9 @@ def _parts(path: Path, encoding: str) -> tuple[list[str], list[str]]:
 
 def _find_grammar(lines: Sequence[str]) -> tuple[str | None, bool]:
     """Return separator and decimal sign by which most lines hold three numbers."""
-    split = {sign: [split_line(line, sign) for line in lines] for sign in dict(GRAMMARS)}
+    there = [sign for sign in dict(GRAMMARS) if sign in (None, ANY_SEPARATOR) or any(sign in line for line in lines)]
+    split: dict[str | None, list[list[str]]] = {sign: [] for sign in dict(GRAMMARS)}
+    split.update((sign, [split_line(line, sign) for line in lines]) for sign in there)
     scores = [sum(holds_three(row, comma) for row in split[sign]) for sign, comma in GRAMMARS]
     best = max(scores[:-1])
     if 2 * best < scores[-1]:
