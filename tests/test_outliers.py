@@ -70,7 +70,7 @@ def test_strays_in_a_flat_box_are_left_out_but_for_those_on_the_surface(name: st
 
 
 def test_strays_among_noise_are_found() -> None:
-    spacing = np.sqrt(make("cloth", 30_000).area / 30_000)
+    spacing = np.sqrt(make("cloth", 30_000).area / 15_000)
     shape, is_true, _ = marked("cloth", 30_000, noise=0.3 * spacing)
     outlier = outliers.find_outliers(shape.points, 3.0)
     assert outlier[~is_true & (shape.distance(shape.points) > 2 * spacing)].mean() >= 0.999
@@ -97,7 +97,7 @@ def test_strays_are_counted_left_out_and_kept_if_asked() -> None:
 
 
 def test_a_tenth_of_strays_does_not_change_the_topology() -> None:
-    shape = make("scallop", outliers=0.1)
+    shape = make("scallop", 20_000, outliers=0.1)
     grid = st.grid_from_points(shape.points, st.Settings(length=shape.length))
     assert (grid.topology.boundary_loops, grid.topology.euler, grid.topology.components) == (1, 1, 1)
     assert len(grid.boundary_loops) == len(shape.loops)
@@ -326,7 +326,7 @@ def test_a_small_sparse_part_inside_a_sheet_stays_and_a_few_strays_go() -> None:
 @pytest.mark.parametrize("members", [0.5, 1.0, 3.0, 6.0])
 def test_a_grid_leaves_out_the_outliers_that_cleaning_does_whatever_its_length(members: float) -> None:
     """Samples of long members do not stand alone where points do, and those of short ones do where points do not."""
-    for shape in (make("scallop", 30_000, outliers=0.1), make("scallop", 30_000)):
+    for shape in (make("scallop", 30_000, outliers=0.1), make("scallop", 15_000)):
         cleaned = clean_points(
             shape.points, smooth=False, normals=False, duplicates=None, loose_pieces=None, layer_distance=None
         )

@@ -31,7 +31,7 @@ from scantruss.surface.supports import free_columns, support_samples
 LENGTH = 1.4
 
 
-def roof(rng: np.random.Generator, count: int = 20_000) -> np.ndarray:
+def roof(rng: np.random.Generator, count: int = 12_000) -> np.ndarray:
     x, y = rng.uniform(-9, 9, count), rng.uniform(-6, 6, count)
     return np.column_stack([x, y, 6.0 - 0.03 * x * x - 0.04 * y * y]) + rng.normal(0.0, 0.004, (count, 3))
 

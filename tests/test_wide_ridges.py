@@ -28,7 +28,7 @@ SIZE, HALF = 5.0, 20.0  # member length, half the side of the box
 ALL_TWELVE = 12
 
 
-def rounded_box(radius: float, count: int = 60_000, noise: float = 0.02, half: float = HALF) -> np.ndarray:
+def rounded_box(radius: float, count: int = 40_000, noise: float = 0.02, half: float = HALF) -> np.ndarray:
     """Points (N, 3) on a cube whose edges are rounded by a radius."""
     rng = np.random.default_rng(5)
     places = rng.uniform(-half, half, (count, 3))
@@ -89,7 +89,7 @@ def test_a_grid_with_wide_ridges_is_nearer_to_the_scan(cloud: PointCloud, made: 
 
 @compiled_only
 def test_more_effort_does_not_leave_the_wide_ridges(made: Grid) -> None:
-    small = PointCloud.from_array(rounded_box(0.57 * SIZE, 24_000, half=0.6 * HALF))
+    small = PointCloud.from_array(rounded_box(0.57 * SIZE, 16_000, half=0.6 * HALF))
     best = grid_from_points(small, Settings(length=SIZE, effort="best"))
     # twelve edges of seven members and more, and of four of the smaller box
     assert len(made.lines) > 60 and len(best.lines) > 36
