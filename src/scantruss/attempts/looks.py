@@ -88,6 +88,14 @@ class AskedScan:
         return wall_of_surface(samples, THIN_WALL * self.asked.length)[1] > SOME_WALLS
 
     @cached_property
+    def has_narrow_gaps(self) -> bool:
+        """Whether samples are thick at gaps between parts of the scan, as between legs, unless the sides of walls are distinguished."""
+        if not self.by_default or self.asked.thin_walls or self.cloud.normals is not None or self.rough <= ROUGH_SCAN:
+            return False
+        apart = sample_surface(self.cloud, self.asked.replace(thin_walls=True))
+        return apart.rough <= ROUGH_AS_WALLS * self.rough and not self.has_thin_walls
+
+    @cached_property
     def has_plain_body(self) -> bool:
         """Whether the scan is a body with thin limbs and slits, and one without them was not asked for."""
         if not self.by_default or self.asked.plain_body or self.asked.sharp_edges:

@@ -200,6 +200,7 @@ ROWS_TRIED: tuple[AttemptRow, ...] = (
     AttemptRow(ROWS_TURNED, TURNED_ROWS, lambda scan, now: has_one_lattice(scan.cloud, now)),
     # where edges, limbs or slits are in the way, other fronts seldom help
     AttemptRow("sharp edges", FIRST_LAYOUT, lambda scan, now: scan.has_sharp_edges, {"sharp_edges": True}),
+    AttemptRow("narrow gaps", FIRST_LAYOUT, lambda scan, now: scan.has_narrow_gaps, {"thin_walls": True}),
     AttemptRow(PLAIN_BODY, FIRST_LAYOUT, lambda scan, now: scan.has_plain_body, {"plain_body": True}),
     AttemptRow("fronts of other lengths", LATER_LAYOUTS),
     *(  # fewer limbs cut off, then none

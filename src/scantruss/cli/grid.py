@@ -185,7 +185,7 @@ def grid_with_notes(
     for name, words in {
         "judge_outliers": "no grid passes with the outliers of this scan, so they are left out, as with --judge-outliers always",
         "sharp_edges": "no grid passes without a look at the sharp edges of this body, so it is made as with --sharp-edges",
-        "thin_walls": "the walls of this scan are thinner than a member, so the grid is made of both of their sides, as with --thin-walls",
+        "thin_walls": "walls of this scan, or gaps in it, are thinner than a member, so the grid runs on both sides, as with --thin-walls",
         "plain_body": "no grid passes with all thin limbs and slits of this body, so it is made without, as with --plain-body",
         "keep_rods": "no grid follows the columns, scaffold or cables of this scan: what was found of them is left out",
         "limb_girth": f"no grid passes with all thin limbs cut off, so it is made as with --limb-girth {made.limb_girth:g}",
