@@ -23,7 +23,7 @@ from scantruss.runtime.memory import RARELY
 settings.register_profile("scantruss", deadline=None, derandomize=True, print_blob=True)
 settings.load_profile("scantruss")
 
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # of each worker: as many as there are processors share them
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # of each worker, as there are as many workers as processors
 
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from ..grid.grid import Grid
     from ..scan.cloud import PointCloud
     from ..settings import Settings
+    from ..surface.samples import SurfaceSamples
 
 # shares of thick samples from which on a scan is rough, and so rough that its mean surface comes first
 ROUGH_SCAN, VERY_ROUGH_SCAN = 0.02, 0.25
@@ -79,9 +80,9 @@ class AskedScan:
     @cached_property
     def has_thin_walls(self) -> bool:
         """Whether the scan has both sides of a wall thinner than a member, which its samples do not tell apart."""
-        if not self.by_default or self.asked.thin_walls or self.cloud.normals is not None:
+        samples = self._with_sides
+        if samples is None:
             return False
-        samples = sample_surface(self.cloud, self.asked.replace(thin_walls=True))
         looks_rough_by_noise = self.rough >= ROUGH_SCAN and samples.rough > ROUGH_AS_WALLS * self.rough
         if looks_rough_by_noise:
             return False
@@ -90,10 +91,17 @@ class AskedScan:
     @cached_property
     def has_narrow_gaps(self) -> bool:
         """Whether samples are thick at gaps between parts of the scan, as between legs, unless the sides of walls are distinguished."""
-        if not self.by_default or self.asked.thin_walls or self.cloud.normals is not None or self.rough <= ROUGH_SCAN:
+        samples = self._with_sides
+        if samples is None or self.rough <= ROUGH_SCAN or self.has_thin_walls:
             return False
-        apart = sample_surface(self.cloud, self.asked.replace(thin_walls=True))
-        return apart.rough <= ROUGH_AS_WALLS * self.rough and not self.has_thin_walls
+        return samples.rough <= ROUGH_AS_WALLS * self.rough
+
+    @property
+    def _with_sides(self) -> SurfaceSamples | None:
+        """The samples with the sides of walls distinguished; None where that is asked for already, or normals came with the scan."""
+        if not self.by_default or self.asked.thin_walls or self.cloud.normals is not None:
+            return None
+        return sample_surface(self.cloud, self.asked.replace(thin_walls=True))
 
     @cached_property
     def has_plain_body(self) -> bool:

@@ -130,9 +130,10 @@ def _parts(path: Path, encoding: str) -> tuple[list[str], list[str]]:
 
 def _find_grammar(lines: Sequence[str]) -> tuple[str | None, bool]:
     """Return separator and decimal sign by which most lines hold three numbers."""
-    there = [sign for sign in dict(GRAMMARS) if sign in (None, ANY_SEPARATOR) or any(sign in line for line in lines)]
-    split: dict[str | None, list[list[str]]] = {sign: [] for sign in dict(GRAMMARS)}
-    split.update((sign, [split_line(line, sign) for line in lines]) for sign in there)
+    split = {  # a line without the sign is one field
+        sign: [split_line(line, sign) for line in lines if sign in (None, ANY_SEPARATOR) or sign in line]
+        for sign in dict(GRAMMARS)
+    }
     scores = [sum(holds_three(row, comma) for row in split[sign]) for sign, comma in GRAMMARS]
     best = max(scores[:-1])
     if 2 * best < scores[-1]:
