@@ -17,7 +17,7 @@ import pytest
 NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 FLAGS = """
 --headless --no-sandbox --no-first-run --no-default-browser-check --remote-debugging-port=0 --disable-dev-shm-usage
---use-gl=angle --use-angle=swiftshader --enable-unsafe-swiftshader --ignore-gpu-blocklist
+--use-gl=angle --use-angle=swiftshader --enable-unsafe-swiftshader --ignore-gpu-blocklist --webgl-antialiasing-mode=none
 --disable-background-networking --disable-background-timer-throttling --disable-backgrounding-occluded-windows
 --disable-renderer-backgrounding --disable-ipc-flooding-protection --disable-hang-monitor --disable-extensions
 --disable-component-update --disable-breakpad --disable-sync --disable-popup-blocking --hide-scrollbars --mute-audio

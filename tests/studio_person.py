@@ -85,10 +85,22 @@ def until(holds: Callable[[], bool], seconds: float = PATIENCE) -> bool:
     return holds()
 
 
+def see(page: Any, selector: str, state: str = "visible") -> None:
+    """Wait until something is visible, hidden, attached or detached, looking more often than Playwright, which soon does twice a second."""
+    found = page.locator(selector).first
+    states = {
+        "visible": found.is_visible,
+        "hidden": found.is_hidden,
+        "attached": lambda: found.count() > 0,
+        "detached": lambda: found.count() == 0,
+    }
+    assert until(states[state]), f"{selector} is not {state}"
+
+
 def tab(page: Any, name: str) -> None:
     """Go to a step."""
     page.click(f"[role=tab]:has-text('{name}')")
-    page.wait_for_selector(f"[role=tab][aria-selected=true]:has-text('{name}')")
+    see(page, f"[role=tab][aria-selected=true]:has-text('{name}')")
 
 
 def field(page: Any, name: str) -> Any:

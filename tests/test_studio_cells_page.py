@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from browser import LARGE_WINDOW, PATIENCE, open_page
 from PIL import Image
-from studio_person import choose, field, served_dome, tab, tick, until
+from studio_person import choose, field, see, served_dome, tab, tick, until
 
 
 def drawn(page: Any) -> int:
@@ -40,49 +40,49 @@ def saved(page: Any, button: str, place: Path) -> Path:
 
 def test_a_person_makes_quads_and_a_double_layer(tmp_path: Path) -> None:
     with served_dome(tmp_path) as (address, session, _), open_page(address, LARGE_WINDOW) as (page, errors):
-        page.wait_for_selector("text=Generate")
+        see(page, "text=Generate")
         tab(page, "Grid")
         tick(page, "draw panels", False)
-        page.wait_for_selector("text=undo: unit", state="attached")
+        see(page, "text=undo: unit", state="attached")
         assert until(lambda: session.grid is not None) and session.worker.wait(PATIENCE)
         with_diagonals = at_rest(page)
         tab(page, "Design")
         choose(page, "triangle", "quad")
-        page.wait_for_selector("text=/ quads .quick preview/")
+        see(page, "text=/ quads .quick preview/")
         tick(page, "planar panels")
         page.click("button:has-text('Generate')")
-        page.wait_for_selector("text=undo: generate")
-        page.wait_for_selector("text=/, off plane 0[.]/")
+        see(page, "text=undo: generate")
+        see(page, "text=/, off plane 0[.]/")
         grid = session.grid
         assert grid is not None and grid.cells == "quad" and grid.settings is not None and grid.settings.planar
         assert until(lambda: 0 < drawn(page) < 0.85 * with_diagonals)  # two of three rows of members are left
         tab(page, "Grid")
         tick(page, "draw panels")
         page.mouse.click(410, 370)
-        page.wait_for_selector("text=/(node|member|panel) [NMP]\\d+/")
+        see(page, "text=/(node|member|panel) [NMP]\\d+/")
         tab(page, "Out")
         read = json.loads(saved(page, "Download the grid", tmp_path / "grid.json").read_text())
         assert len(read["panels"]) == len(grid.panel_table) and {len(panel) for panel in read["panels"]} == {4}
         tab(page, "Structure")
         page.click("button:has-text('Run')")
-        page.wait_for_selector("text=mass without nodes")
+        see(page, "text=mass without nodes")
         field(page, "loads").fill("self")
         single = at_rest(page)
         page.click("text=Double layer and joints")
         field(page, "depth").fill("70")
         page.click("button:has-text('Run')")
-        page.wait_for_selector("[role=alert]:has-text('too much where the grid bends')")
+        see(page, "[role=alert]:has-text('too much where the grid bends')")
         field(page, "depth").fill("0.8")
         page.click("button:has-text('Run')")
-        page.wait_for_selector("text=/^web .* members of/")
+        see(page, "text=/^web .* members of/")
         assert session.solution is not None and len(session.solution.truss.members) > 3 * len(grid.edges)
         assert until(lambda: drawn(page) > 1.1 * single)
         tab(page, "Out")
         read = json.loads(saved(page, "Download the structure", tmp_path / "structure.json").read_text())
         assert len(read["members"]) == len(session.solution.truss.members)
         page.click("button:has-text('Undo')")
-        page.wait_for_selector("text=redo: run")
+        see(page, "text=redo: run")
         page.reload()
         tab(page, "Design")
-        page.wait_for_selector("input[value='quad']")
+        see(page, "input[value='quad']")
         assert errors == []

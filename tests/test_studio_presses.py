@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 from browser import LARGE_WINDOW, PATIENCE, open_page
 from studio_dome import done, session_of_dome
-from studio_person import field, served_dome, served_session, tab, until
+from studio_person import field, see, served_dome, served_session, tab, until
 
 from scantruss.grid.grid import Grid
 from scantruss.layouts.on_scan import ScanOfGrid
@@ -53,9 +53,9 @@ def press_while(page: Any, selector: str, changes: Any) -> None:
 def test_a_press_counts_though_a_run_begins_or_is_refused_meanwhile(served: tuple[str, Session, Any]) -> None:
     address, session, _ = served
     with open_page(address) as (page, errors):
-        page.wait_for_selector("text=Generate")
+        see(page, "text=Generate")
         assert session.worker.wait(PATIENCE)
-        page.wait_for_selector("text=ready")
+        see(page, "text=ready")
 
         def say(stage: str, message: str) -> None:
             session.stage, session.share, session.message = stage, 0.5, message
@@ -78,9 +78,9 @@ def test_a_press_counts_though_a_run_begins_or_is_refused_meanwhile(served: tupl
 def test_a_press_means_the_control_that_it_began_on(served: tuple[str, Session, Any]) -> None:
     address, session, _ = served
     with open_page(address, LARGE_WINDOW) as (page, errors):
-        page.wait_for_selector("text=Generate")
+        see(page, "text=Generate")
         assert session.worker.wait(PATIENCE)
-        page.wait_for_selector("text=ready")
+        see(page, "text=ready")
         page.evaluate(
             "window.generate = [...document.querySelectorAll('button')].find((e) => e.textContent === 'Generate')"
         )
@@ -100,7 +100,7 @@ def test_presses_that_come_at_once_all_count(served: tuple[str, Session, Any]) -
     """A page that was busy takes what was pressed meanwhile at once; viser sends one message of a panel in 50 ms."""
     address, session, _ = served
     with open_page(address) as (page, errors):
-        page.wait_for_selector("text=Generate")
+        see(page, "text=Generate")
         assert session.worker.wait(PATIENCE)
         tab(page, "Grid")
         page.evaluate("""() => {
@@ -128,7 +128,7 @@ def test_what_was_typed_counts_for_a_press_before_its_pause_is_over(
     monkeypatch.setattr("scantruss.studio.typed_fields.TYPING_PAUSE", PATIENCE)
     address, session, _ = served
     with open_page(address) as (page, errors):
-        page.wait_for_selector("text=Generate")
+        see(page, "text=Generate")
         assert session.worker.wait(PATIENCE)
         tab(page, "Design")
         length = float(f"{1.3 * session.settings.length:.3g}")
@@ -151,7 +151,7 @@ def test_what_the_server_writes_meanwhile_comes_between_no_characters(
     monkeypatch.setattr(server, "PAGE_SCRIPTS", tuple(patient))
     address, session, pages = served
     with open_page(address) as (page, errors):
-        page.wait_for_selector("text=Generate")
+        see(page, "text=Generate")
         assert session.worker.wait(PATIENCE)
         tab(page, "Design")
         length = field(page, "exactly")
@@ -208,13 +208,13 @@ def test_a_number_of_the_curve_counts_while_the_trade_goes_on(tmp_path: Path, mo
 
     monkeypatch.setattr(trade_steps, "traded_lengths", in_steps)
     with served_session(session) as (address, _), open_page(address) as (page, errors):
-        page.wait_for_selector("text=Generate")
+        see(page, "text=Generate")
         tab(page, "Design")
         page.click("text=Few different parts")
         field(page, "tolerance").fill("20%")
         page.click("button:has-text('Find what fewer cost')")
         number = COUNTS_TRIED[1]
-        page.wait_for_selector(f"svg [data-low='{number}'] rect", state="attached")
+        see(page, f"svg [data-low='{number}'] rect", state="attached")
         page.click(f"svg [data-low='{number}'] rect")
         goes_on.set()  # another number of lengths comes while the number on the curve is being taken
         assert until(lambda: session.grid is not None and session.grid.alike is not None)
@@ -244,7 +244,7 @@ def test_a_number_that_is_pressed_again_counts_though_its_run_was_stopped(
 
     monkeypatch.setattr(ScanOfGrid, "certified", stopped_first)
     with served_session(session) as (address, _), open_page(address) as (page, errors):
-        page.wait_for_selector("text=Generate")
+        see(page, "text=Generate")
         tab(page, "Design")
         page.click("text=Few different parts")
         page.click("svg [data-low='5'] rect")

@@ -11,7 +11,7 @@ from urllib.parse import urlsplit
 import numpy as np
 from browser import LARGE_WINDOW, PATIENCE, open_page
 from PIL import Image
-from studio_person import choose, click_corners, field, served_dome, tab, tick, until, until_drawn
+from studio_person import choose, click_corners, field, see, served_dome, tab, tick, until, until_drawn
 
 from scantruss.grid.marks import node_marks
 from scantruss.studio.browsers import Browsers
@@ -21,7 +21,7 @@ from scantruss.studio.server import serve_browsers, start_server
 def ready(page: Any, session: Any) -> None:
     """Wait until nothing runs."""
     assert session.worker.wait(PATIENCE)
-    page.wait_for_selector("text=Generate")
+    see(page, "text=Generate")
 
 
 def greens(page: Any) -> int:
@@ -40,66 +40,66 @@ def test_what_is_refused_or_old_is_told_from_what_is(tmp_path: Path) -> None:
     with served_dome(tmp_path) as (address, session, _), open_page(address) as (page, errors):
         ready(page, session)
         tab(page, "Out")
-        page.wait_for_selector("text=this is the quick preview")
+        see(page, "text=this is the quick preview")
         assert "--effort quick" in page.inner_text("pre:visible")
         undo = page.locator("button:has-text('Undo')").first
         assert "takes back" in undo.get_attribute("title") and "ends what runs" not in undo.get_attribute("title")
         tab(page, "Design")
         page.click("text=Holes and ridges")
         tick(page, "find and draw them")
-        page.wait_for_selector("text=none found")
+        see(page, "text=none found")
         assert field(page, "click to").input_value() == "switch hole or ridge"
         tab(page, "Structure")
         assert until(lambda: field(page, "click to").input_value() == "select"), "it ended with its tab"
-        page.wait_for_selector("text=this is the quick preview")
+        see(page, "text=this is the quick preview")
         assert until(lambda: greens(page) > 100), "supports are drawn before they are solved"
         say(page, "supports", "cornets")
-        page.wait_for_selector("text=did you mean corners?")
+        see(page, "text=did you mean corners?")
         assert until(lambda: greens(page) == 0)
         say(page, "supports", "corners")
         assert until(lambda: 0 < greens(page) < 1000)
         page.click("button:has-text('Generate')")
-        page.wait_for_selector("text=this is the quick preview", state="hidden")
+        see(page, "text=this is the quick preview", state="hidden")
         assert not session.state.is_live
         assert session.grid is not None
         first, last = node_marks(session.grid)[0], node_marks(session.grid)[-1]
         say(page, "supports", "fixed")
         page.click("button:has-text('Run')")
-        page.wait_for_selector("text=place some in Constraints")
+        see(page, "text=place some in Constraints")
         say(page, "supports", "boundary")  # corrected: nothing is refused any more
-        page.wait_for_selector(".studio-refused", state="detached")
+        see(page, ".studio-refused", state="detached")
         page.click("button:has-text('Run')")
-        page.wait_for_selector("text=lowest frequency")
+        see(page, "text=lowest frequency")
         say(page, "supports", first)
-        page.wait_for_selector("text=before the last change, supports boundary")
+        see(page, "text=before the last change, supports boundary")
         say(page, "supports", f"boundary+{last}")
         page.click("button:has-text('Run')")
-        page.wait_for_selector("text=before the last change", state="detached")
+        see(page, "text=before the last change", state="detached")
         page.click("text=Sizing and modes")
         say(page, "most sections", "2")
-        page.wait_for_selector("text=the section is chosen by sizing, at most 2")
+        see(page, "text=the section is chosen by sizing, at most 2")
         assert page.locator("text=Sizing and modes (sections chosen by sizing, at most 2)").count() == 1
         tab(page, "Design")
         say(page, "exactly", "60")
-        page.wait_for_selector("text=length 60 m is too large")
+        see(page, "text=length 60 m is too large")
         assert field(page, "exactly").input_value() == "60" and session.settings.length != 60
         page.click("button:has-text('See all')")
-        page.wait_for_selector(".studio-refused", state="detached")
+        see(page, ".studio-refused", state="detached")
         assert until(lambda: field(page, "exactly").input_value() == f"{session.settings.length:g}")
         tab(page, "Scan")
         page.click("text=Crop")
         say(page, "crop", "box:1,2")
         page.locator("button:has-text('Crop')").last.click()
-        page.wait_for_selector(".studio-refused:has-text('crop must be')")
+        see(page, ".studio-refused:has-text('crop must be')")
         say(page, "crop", "box:0,0,9,9")
-        page.wait_for_selector(".studio-refused", state="detached")
+        see(page, ".studio-refused", state="detached")
         assert errors == []
 
 
 def test_progress_and_steps_stay_in_sight_and_draw_scan_as_set(tmp_path: Path) -> None:
     with served_dome(tmp_path) as (address, session, _), open_page(address) as (page, errors):
         ready(page, session)
-        page.wait_for_selector("text=ready")
+        see(page, "text=ready")
         assert not field(page, "draw scan").is_checked()
         field(page, "draw scan").click()
         choose(page, "m", "cm")
@@ -132,12 +132,12 @@ def test_undo_drops_the_last_corner_of_a_polygon_and_one_that_crosses_itself_is_
         session.measure(((1.0, 1.0, 1.0), (2.0, 2.0, 1.0)))
         page.click("text=Crop")
         page.click("button:has-text('Polygon')")
-        page.wait_for_selector("input[value='corner of crop']")
+        see(page, "input[value='corner of crop']")
         until_drawn(pages)
         click_corners(page, pages, (300, 250), (550, 250), (550, 500))
         assert until(lambda: field(page, "crop").input_value().count(",") == 5)
         page.mouse.click(420, 150)
-        page.wait_for_selector("text=the polygon would cross itself")
+        see(page, "text=the polygon would cross itself")
         assert field(page, "crop").input_value().count(",") == 5
         page.mouse.click(300, 500)
         assert until(lambda: field(page, "crop").input_value().count(",") == 7)
@@ -155,12 +155,12 @@ def test_a_page_says_when_the_server_has_gone_and_goes_on_when_it_is_back(tmp_pa
             pass
         assert page.locator("text=Connection lost").count() == 0
         pages.stop()
-        page.wait_for_selector("text=Connection lost")
+        see(page, "text=Connection lost")
         server, _ = start_server("127.0.0.1", int(urlsplit(address).port or 0))
         again = serve_browsers(server, Browsers(session))
         try:
-            page.wait_for_selector("text=Connection lost", state="detached")
-            page.wait_for_selector("text=dome.scantruss")
+            see(page, "text=Connection lost", state="detached")
+            see(page, "text=dome.scantruss")
             tab(page, "Design")
             length = session.settings.length
             page.focus("[role=slider]:visible")
