@@ -672,6 +672,20 @@ def test_a_length_is_found_that_passes_only_far_above_one_that_loses_limbs(monke
     assert advice.suggest() > 1.8 * usual and advice.passes
 
 
+def test_where_limbs_are_too_thin_a_length_is_found_between_the_usual_one_and_the_next_below(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    cloud = cloud_of("limpet")
+    usual = Advice(cloud, st.Settings(length=1.0)).suggest()
+    monkeypatch.setattr(LengthTrial, "loses_limbs", property(lambda trial: not trial.passed))
+    made: list[float] = counted_runs(
+        monkeypatch, lambda length: 0.8 * usual < length < 0.9 * usual and made.count(length) >= 3
+    )
+    advice = Advice(cloud, st.Settings(length=1.0))
+    assert 0.8 * usual < advice.suggest() < 0.9 * usual and advice.passes
+    assert len(made) <= MOST_TRIED + TRIED_AROUND
+
+
 def thin_bowl(count: int = 40_000, radius: float = 60.0, wall: float = 6.0) -> np.ndarray:
     """A half sphere that is a thin solid, with a flat lip."""
     rng = np.random.default_rng(3)

@@ -96,7 +96,8 @@ class Advice:
             self._begun[length] = (settings, trials, AttemptLimit())
         settings, tried, limit = self._begun[length]
         before = limit.runs
-        limit.allow(allowed, stops_early=not (self._is_nearby or length == self._usual or self.passes))
+        takes_all = self._is_nearby or length == self._usual or (self._loses_limbs() and not self._has_table_grids)
+        limit.allow(allowed, stops_early=not (takes_all or self.passes))
         grid, fault = None, known.fault if known is not None else None
         try:
             grid = first_that_passes(self._cloud, settings, tried, limit=limit, progress=self._show(length))
@@ -154,7 +155,7 @@ class Advice:
         It is the first of those tried in turn that passes with what is next above it, both without much of the scan lost; else of
         those that pass with what is next above them the first that loses hardly more than the least; else the next below one that
         passes, if it passes too; else one that passes, if there is one with another not far above it that passes too, and rather
-        one that loses little; else the usual length. Where none passes, longer ones are looked at once more, then those beside the
+        one that loses little; else the usual length. Where none passes, some more are looked at, then those beside the
         usual one. One that closes openings or loses ridges gives way to one that does not, if that passes and loses no more.
         """
         self.is_spent = True
@@ -186,7 +187,7 @@ class Advice:
             length = self._losing_less(next(length for length, lost in both.items() if lost <= most_lost))
             return self._following_more(self._found[length])
         if not self.passes:
-            self._try_longer()
+            self._try_last()
         if not self.passes:
             self._try_beside()
         passing = [trial.length for trial in self.tried if trial.passed]
@@ -221,18 +222,18 @@ class Advice:
         self._count_at(trial.length, ladder.FIRST_TWO * ladder.STEPS_TO_FOLLOW)
         return length_that_follows(self, trial)
 
-    def _try_longer(self) -> None:
-        """Try longer lengths than the usual one until one passes, with the grids of the table: columns are then seen for what they are.
+    def _try_last(self) -> None:
+        """Try more lengths until one passes, with the grids of the table; not of a scan so large that fewer grids are made.
 
-        Not of a scan so large that fewer grids are made.
+        They are longer than the usual one, as columns are then seen for what they are; where limbs are too thin, one a bit shorter first.
         """
         if ladder.LEAST_TRIED * self._cost(self._usual) >= ladder.POINTS_LOOKED_AT:
             return
         self._count_at(self._usual, ladder.TRIED_AROUND)
         self._has_table_grids = False
-        for share in ladder.LAST_LENGTHS:
+        for share, most in ladder.LAST_WITH_LIMBS if self._loses_limbs() else ladder.LAST_LENGTHS:
             length = min(ladder.two_digits(share * self._usual), length_range(self._cloud)[1])
-            trial = self.try_length(length, ladder.TRIED_LONGER)
+            trial = self.try_length(length, most)
             if trial is not None and trial.passed:
                 return
 

@@ -26,7 +26,9 @@ SHORTER_FIRST = (
     (1 / 1.4, A_FEW), (1.4, A_FEW), (1.0, SOME_MORE), (0.5, A_FEW), (2.0, A_FEW), (1 / 1.4, SOME_MORE), (1.4, SOME_MORE),
     (2.8, A_FEW), (2.0, SOME_MORE),
 )  # fmt: skip
-LAST_LENGTHS = (1.4, 2.0, 2.8)  # lengths that are tried where none has passed, as multiples of the usual one
+#: lengths to try where none has passed, and where limbs are too thin besides: one of the body without them is made as the third grid
+LAST_LENGTHS = ((1.4, FIRST_TWO), (2.0, FIRST_TWO), (2.8, FIRST_TWO))
+LAST_WITH_LIMBS = ((0.85, 3), (2.0, FIRST_TWO))
 NEARLY_NEXT = 1.45  # ratio of lengths that pass up to which the longer one stands for the next to the shorter
 LINES_OF_A_SCANNER = 5  # fewest lines of points that may be those of a scanner
 NEXT_LENGTH = 1.4  # a length is suggested if that many times it passes too
@@ -47,7 +49,6 @@ MOST_TRIED = 20.0  # grids that are made for a suggestion, or to find a length n
 POINTS_LOOKED_AT = 2_000_000  # points that are looked at for that
 LEAST_TRIED = 5.0  # grids that are made for that even where the scan has more points
 TRIED_AROUND = 6.0  # grids that are made besides for the lengths of the table, one each
-TRIED_LONGER = 2  # grids that are made of each longer length where no other has passed, of those for the table
 TRIED_USUAL = 4.0  # grids that are made at the usual length where no length nearby passes
 FAR_TOO_SHORT = 0.2  # share of the shortest possible length below which the usual one is looked at alone: that length is in another unit
 POINTS_PER_MEMBER = 9  # points that cost as much as a member of the grid

@@ -62,15 +62,14 @@ def _alike(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     count = min(ALIKE_PLACES, len(first), len(second))
     if count == 0:
         return np.zeros((0, 2), np.int64)
-    there = np.argpartition(apart, count - 1, axis=1)[:, :count]
+    there = np.argpartition(apart, count - 1, axis=1)[:, :count]  # the least similar of them last
     back = np.argpartition(apart, count - 1, axis=0)[:count].T
     one = np.stack([np.repeat(np.arange(len(first)), count), there.ravel()], axis=1)
     two = np.stack([back.ravel(), np.repeat(np.arange(len(second)), count)], axis=1)
     code, times = np.unique(np.concatenate([one, two]) @ np.array([len(second), 1]), return_counts=True)
     pairs = np.stack([code // len(second), code % len(second)], axis=1)
     # similarity counts relative to that of other places: places on plain parts are similar to all
-    usual = np.partition(apart, count - 1, axis=1)[:, count - 1]
-    other = np.partition(apart, count - 1, axis=0)[count - 1]
+    usual, other = apart[np.arange(len(first)), there[:, -1]], apart[back[:, -1], np.arange(len(second))]
     i, j = pairs.T
     rank = apart[i, j] / np.sqrt(np.maximum(usual[i] * other[j], 1e-12))
     order = np.lexsort((code, rank, -times))
