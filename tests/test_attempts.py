@@ -27,7 +27,7 @@ from scantruss.attempts.table import (
     attempts,
 )
 from scantruss.errors import FrontError
-from scantruss.grid.certificate import LeftOut
+from scantruss.grid.certificate import Certificate, Fault, LeftOut
 from scantruss.surface import samples
 
 NAMES = [row.name for row in ROWS_TRIED]
@@ -211,6 +211,31 @@ def test_a_grid_that_breaks_a_limb_is_none_that_passes(monkeypatch: pytest.Monke
     with pytest.raises(st.CertificateError, match="torn at a limb") as refused:
         course.outcome()
     assert refused.value.where == (1.0, 2.0, 3.0)
+
+
+def refused_for(*faults: tuple[str, str]) -> st.CertificateError:
+    """Return the refusal of a grid with faults of some kinds and words."""
+    found = Certificate(
+        "", 0.5, True, True, 1, 1, 1, 1, 1, 0, faults=tuple(Fault(kind, words, None) for kind, words in faults)
+    )
+    return st.CertificateError("it fails", cast(Any, SimpleNamespace(certificate=found, cells="triangle")))
+
+
+def test_a_refusal_says_what_accepts_a_grid_made_otherwise_that_only_leaves_out_sparse_parts() -> None:
+    cloud, asked = st.PointCloud.from_array(CLOUDS["cap"][0]), st.Settings(length=1.0, effort="quick")
+    angle, sparse = ("angle", "has an angle of 9 degrees"), ("sparse", "leaves out at least 8% of the surface")
+    for first, later, is_said in (
+        ((angle,), (sparse,), True),
+        ((angle,), (angle, sparse), False),
+        ((sparse,), (sparse,), False),
+    ):
+        course = AttemptCourse(cloud, asked)
+        for number, attempt in enumerate(course):
+            course.failed(attempt, refused_for(*(later if number else first)))
+        with pytest.raises(FrontError) as raised:
+            course.outcome()
+        said = "one made otherwise only leaves out at least 8% of the surface: --allow-missing accepts that"
+        assert (said in str(raised.value)) == is_said
 
 
 def test_ridges_are_given_up_right_after_the_fault_and_the_first_fault_counts(monkeypatch: pytest.MonkeyPatch) -> None:

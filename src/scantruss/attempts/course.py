@@ -10,7 +10,15 @@ from typing import TYPE_CHECKING
 from ..check.limits import with_ridges_given_up, with_ridges_lost
 from ..errors import CertificateError, FrontError, OneSidedError, ScanTrussError
 from ..improve.longer_search import is_no_worse
-from .limit import AttemptLimit, fails_as_sparse, fails_by_front, joins_sheets, loses_limbs, only_leaves_out
+from .limit import (
+    AttemptLimit,
+    fails_as_sparse,
+    fails_by_front,
+    joins_sheets,
+    loses_limbs,
+    only_leaves_out,
+    only_sparse,
+)
 from .looks import (
     POOR_MEMBERS,
     AskedScan,
@@ -222,7 +230,7 @@ class AttemptCourse:
         ------
         ScanTrussError
             None does; the fault with the effort asked for, of the first attempt with the settings asked for that gave a grid, else
-            of the first. It names the settings of a grid of the mean surface that only leaves out too much.
+            of the first. It says what accepts a grid of another attempt that only leaves out too much.
         """
         if self._passed is not None:
             return self._passed
@@ -236,7 +244,7 @@ class AttemptCourse:
         worst = next((fault for fault in self._faults if isinstance(fault, CertificateError)), self._faults[0])
         if isinstance(worst, CertificateError) and not (self._row_begun is not None and self._row_begun.is_trial):
             worst = worst.whole
-        if self._advice and isinstance(worst, FrontError) and not only_leaves_out(worst):
+        if self._advice and isinstance(worst, FrontError) and not (only_leaves_out(worst) or only_sparse(worst)):
             return type(worst)(f"{worst}; {self._advice}", worst.grid, worst.where)
         return worst
 

@@ -33,6 +33,11 @@ def only_leaves_out(fault: ScanTrussError) -> TypeGuard[CertificateError]:
     return _kinds_of(fault.whole) == {"cover"}
 
 
+def only_sparse(fault: ScanTrussError) -> TypeGuard[CertificateError]:
+    """Whether all that is wrong with a grid is that it leaves out surface where points are too far apart for its members."""
+    return isinstance(fault, CertificateError) and _kinds_of(fault) == {"sparse"} == _kinds_of(fault.whole)
+
+
 def _kinds_of(fault: CertificateError) -> set[str]:
     """Return of which kinds the faults of a grid are."""
     found = fault.grid.certificate if fault.grid is not None else None

@@ -17,7 +17,7 @@ from ..errors import CertificateError, FrontError, words_of_place
 from ..front.orientation_field import FieldStart
 from ..settings import SAMPLE_SPACING
 from ..surface.samples import sample_surface
-from .limit import FAR_MISSING, only_leaves_out
+from .limit import FAR_MISSING, only_leaves_out, only_sparse
 from .looks import ROUGH_SCAN, VERY_ROUGH_SCAN, AskedScan, has_one_lattice
 
 if TYPE_CHECKING:
@@ -108,7 +108,11 @@ class Attempt:
         return self.starts is not None or has_one_lattice(cloud, self.settings)
 
     def advice(self, fault: ScanTrussError) -> str:
-        """Say with which settings a grid passes that only leaves out too much: of the mean surface, or without thin limbs; else nothing."""
+        """Say what accepts a grid that only leaves out too much: sparse parts, or all but the mean surface, or thin limbs; else nothing."""
+        if only_sparse(fault):
+            return (
+                f"one made otherwise only {fault.whole.grid.certificate.faults[0].words}: --allow-missing accepts that"
+            )
         if not only_leaves_out(fault):
             return ""
         found = fault.whole.grid.certificate
