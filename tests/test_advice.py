@@ -404,6 +404,29 @@ def test_a_length_beside_the_usual_one_is_suggested_where_steps_of_the_table_mis
     assert len(made) <= MOST_TRIED + TRIED_AROUND
 
 
+def test_the_length_that_came_nearest_gets_two_more_grids_before_those_beside_the_usual_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    cloud = cloud_of("limpet")
+    usual = Advice(cloud, st.Settings(length=1.0)).suggest()
+    made: list[float] = []
+    make_grid = pipeline.make_grid
+
+    def tried(cloud: st.PointCloud, attempt: Attempt, **others: Any) -> st.Grid:
+        length = attempt.settings.length
+        made.append(length)
+        is_near = 1.3 * usual < length < 1.5 * usual
+        if is_near and made.count(length) > 4:  # as many as it gets in its turn
+            return make_grid(cloud, attempt, **others)
+        raise refused_with(3, Fault("long", "has a long member")) if not is_near else refused_with(3)
+
+    monkeypatch.setattr(pipeline, "make_grid", tried)
+    advice = Advice(cloud, st.Settings(length=1.0))
+    length = advice.suggest()
+    assert advice.passes and 1.3 * usual < length < 1.5 * usual
+    assert len(made) <= MOST_TRIED + TRIED_AROUND and not any(0.85 * usual < each < 0.95 * usual for each in made)
+
+
 def test_of_lengths_that_lose_about_as_much_the_usual_one_is_suggested(monkeypatch: pytest.MonkeyPatch) -> None:
     """As of a canopy whose mast is left out at each of them: a few points more or less decide nothing, nor does the unit with them."""
 
@@ -468,11 +491,10 @@ def test_where_only_thin_limbs_are_missing_the_option_that_accepts_that_is_named
     assert accepted_line(trials) == [f"with --length {each} a grid without its thin limbs passes" for each in said]
 
 
-def refused_with(crossings: int) -> st.CertificateError:
+def refused_with(crossings: int, *others: Fault) -> st.CertificateError:
     """Return the refusal of a grid with so many triangles that cut each other, and two boundaries of three."""
-    found = Certificate(
-        "", 0.5, True, True, 1, 1, 2, 3, 1, 0, crossings=crossings, faults=(Fault("crossing", "cuts itself"),)
-    )
+    faults = (Fault("crossing", "cuts itself"), *others)
+    found = Certificate("", 0.5, True, True, 1, 1, 2, 3, 1, 0, crossings=crossings, faults=faults)
     return st.CertificateError("it fails", cast(Any, SimpleNamespace(certificate=found, cells="triangle")))
 
 

@@ -238,15 +238,22 @@ class Advice:
                 return
 
     def _try_beside(self) -> None:
-        """Try lengths beside the usual one until one passes, where grids and hope are left: steps as of the table may miss it."""
+        """Try lengths until one passes, where grids and hope are left: that which came nearest, then those beside the usual one.
+
+        Steps as of the table may miss them.
+        """
         left = ladder.MOST_TRIED + ladder.TRIED_AROUND - self._spent
         is_large = ladder.LEAST_TRIED * self._cost(self._usual) >= ladder.POINTS_LOOKED_AT
         usual = self._begun.get(self._usual)
         if is_large or left < ladder.FIRST_TWO or (usual is not None and usual[2].all_hopeless):
             return
-        self._count_at(self._usual, min(left, ladder.FIRST_TWO * len(ladder.BESIDE_USUAL)))
-        for share in ladder.BESIDE_USUAL:
-            trial = self.try_length(ladder.two_digits(share * self._usual), ladder.FIRST_TWO)
+        steps = [(ladder.two_digits(share * self._usual), ladder.FIRST_TWO) for share in ladder.BESIDE_USUAL]
+        nearest = min((trial for trial in self.tried if trial.paused), key=lambda trial: trial.faults, default=None)
+        if nearest is not None and nearest.faults == 1:
+            steps.insert(0, (nearest.length, nearest.grids + ladder.FIRST_TWO))
+        self._count_at(self._usual, min(left, ladder.FIRST_TWO * len(steps)))
+        for length, most in steps:
+            trial = self.try_length(length, most)
             if trial is not None and trial.passed:
                 return
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -13,6 +14,7 @@ from ..grid.line_sets import RIDGE, sets_of
 from ..pipeline import first_that_passes
 
 if TYPE_CHECKING:
+    from ..grid.certificate import Certificate
     from ..grid.grid import Grid
     from ..runtime.progress import Progress
     from ..scan.cloud import PointCloud
@@ -39,16 +41,26 @@ class LengthTrial:
         return self.grid is not None
 
     @property
+    def _failed(self) -> Certificate | None:
+        """The certificate of the first grid, where that fails."""
+        return getattr(getattr(self.fault, "grid", None), "certificate", None)
+
+    @property
+    def faults(self) -> float:
+        """Of how many kinds the faults of the first grid are; inf where there is none."""
+        return math.inf if self._failed is None else len(self._failed.faults)
+
+    @property
     def leaves_out(self) -> bool:
         """Whether the first grid fails as it leaves out too much of the scan."""
-        found = getattr(getattr(self.fault, "grid", None), "certificate", None)
-        return found is not None and any(fault.kind == "cover" for fault in found.faults)
+        return self._failed is not None and any(fault.kind == "cover" for fault in self._failed.faults)
 
     @property
     def loses_limbs(self) -> bool:
         """Whether the first grid fails as limbs are too thin for its members; longer ones lose more."""
-        found = getattr(getattr(self.fault, "grid", None), "certificate", None)
-        return self.leaves_out and found is not None and any(part.kind == "limbs" for part in found.left_out)
+        return (
+            self._failed is not None and self.leaves_out and any(part.kind == "limbs" for part in self._failed.left_out)
+        )
 
     @property
     def lost(self) -> float:
