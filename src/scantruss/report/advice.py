@@ -155,8 +155,8 @@ class Advice:
         It is the first of those tried in turn that passes with what is next above it, both without much of the scan lost; else of
         those that pass with what is next above them the first that loses hardly more than the least; else the next below one that
         passes, if it passes too; else one that passes, if there is one with another not far above it that passes too, and rather
-        one that loses little; else the usual length. Where none passes, some more are looked at, then those beside the
-        usual one. One that closes openings or loses ridges gives way to one that does not, if that passes and loses no more.
+        one that loses little; else the usual length. Where none passes, some more are looked at. One that closes openings or loses
+        ridges gives way to one that does not, if that passes and loses no more.
         """
         self.is_spent = True
         low, high = length_range(self._cloud)

@@ -26,7 +26,7 @@ SHORTER_FIRST = (
     (1 / 1.4, A_FEW), (1.4, A_FEW), (1.0, SOME_MORE), (0.5, A_FEW), (2.0, A_FEW), (1 / 1.4, SOME_MORE), (1.4, SOME_MORE),
     (2.8, A_FEW), (2.0, SOME_MORE),
 )  # fmt: skip
-#: lengths to try where none has passed, and where limbs are too thin besides: one of the body without them is made as the third grid
+#: lengths to try where none has passed, and where limbs are too thin besides, so that the third grid is that of the body without them
 LAST_LENGTHS = ((1.4, FIRST_TWO), (2.0, FIRST_TWO), (2.8, FIRST_TWO))
 LAST_WITH_LIMBS = ((0.85, 3), (2.0, FIRST_TWO))
 NEARLY_NEXT = 1.45  # ratio of lengths that pass up to which the longer one stands for the next to the shorter
