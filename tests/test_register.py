@@ -407,11 +407,11 @@ def test_it_can_be_stopped(scanned: tuple[list[np.ndarray], list[np.ndarray], Sp
 
 
 def shared(folder: str, poses: str) -> tuple[list[str], list[PointCloud], list[np.ndarray]]:
-    """Names, clouds and true poses of the scans in a folder of the shared data, every eighth point."""
+    """Names, clouds and true poses of the scans in a folder of the shared data, every fourth point."""
     true = read_poses(DATA / folder / poses)
     names = [name for name in sorted(true) if not name.startswith(OTHER_VIEWS)]  # from the sides alone
     clouds = [st.read_points(DATA / folder / name) for name in names]
-    thinned = [PointCloud.from_array((cloud.points + cloud.origin)[::8]) for cloud in clouds]
+    thinned = [PointCloud.from_array((cloud.points + cloud.origin)[::4]) for cloud in clouds]
     return names, thinned, [true[name] for name in names]
 
 

@@ -28,14 +28,17 @@ CUTS_BY = ("limb_girth", "keep_rods", "judge_outliers", "smooth_scale", "thin_wa
 
 def only_leaves_out(fault: ScanTrussError) -> TypeGuard[CertificateError]:
     """Whether a grid only leaves out too much of the scan."""
-    if not isinstance(fault, CertificateError) or _kinds_of(fault) != {"cover"}:
-        return False
-    return _kinds_of(fault.whole) == {"cover"}
+    return _fails_only_by("cover", fault)
 
 
 def only_sparse(fault: ScanTrussError) -> TypeGuard[CertificateError]:
     """Whether all that is wrong with a grid is that it leaves out surface where points are too far apart for its members."""
-    return isinstance(fault, CertificateError) and _kinds_of(fault) == {"sparse"} == _kinds_of(fault.whole)
+    return _fails_only_by("sparse", fault)
+
+
+def _fails_only_by(kind: str, fault: ScanTrussError) -> bool:
+    """Whether all faults of a grid are of a kind; its whole certificate is made only where those that were looked for are."""
+    return isinstance(fault, CertificateError) and _kinds_of(fault) == {kind} and _kinds_of(fault.whole) == {kind}
 
 
 def _kinds_of(fault: CertificateError) -> set[str]:

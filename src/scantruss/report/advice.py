@@ -248,8 +248,8 @@ class Advice:
         if is_large or left < ladder.FIRST_TWO or (usual is not None and usual[2].all_hopeless):
             return
         steps = [(ladder.two_digits(share * self._usual), ladder.FIRST_TWO) for share in ladder.BESIDE_USUAL]
-        nearest = min((trial for trial in self.tried if trial.paused), key=lambda trial: trial.faults, default=None)
-        if nearest is not None and nearest.faults == 1:
+        nearest = next((trial for trial in self.tried if trial.paused and trial.has_one_fault), None)
+        if nearest is not None:
             steps.insert(0, (nearest.length, nearest.grids + ladder.FIRST_TWO))
         self._count_at(self._usual, min(left, ladder.FIRST_TWO * len(steps)))
         for length, most in steps:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -46,9 +45,9 @@ class LengthTrial:
         return getattr(getattr(self.fault, "grid", None), "certificate", None)
 
     @property
-    def faults(self) -> float:
-        """Of how many kinds the faults of the first grid are; inf where there is none."""
-        return math.inf if self._failed is None else len(self._failed.faults)
+    def has_one_fault(self) -> bool:
+        """Whether a single fault keeps the first grid from passing."""
+        return self._failed is not None and len(self._failed.faults) == 1
 
     @property
     def leaves_out(self) -> bool:
