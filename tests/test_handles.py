@@ -50,6 +50,13 @@ def test_a_grid_with_such_a_strut_fails(whole: st.Grid) -> None:
 
 
 @compiled_only
+def test_a_short_tunnel_is_no_strut() -> None:
+    """Its sides face each other, and rings around it lie aslope: this grid was refused."""
+    grid = st.grid_from_points(tire(2.0, 1.6, 0.1), st.Settings(length=0.5, effort="quick"))
+    assert known(grid.certificate).passed and known(grid.certificate).handles == 1
+
+
+@compiled_only
 def test_a_ring_around_a_wide_joint_has_a_sheet_on_either_side_within_and_one_around_a_limb_has_none() -> None:
     """Two legs passed as joined at their feet, around which nothing faces the other side."""
     turn = np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False)

@@ -31,7 +31,8 @@ def false_struts(grid: Grid, samples: SurfaceSamples, found: Certificate, length
     """Return a fault where handles of a grid join two sheets of its scan which the scan does not join there.
 
     Around a limb or a handle of the scan its normals point away from the limb. Around a strut between two sheets that only lie near
-    each other, as two legs do, they point along it, those of each sheet towards the other.
+    each other, as two legs do, they point along it, those of each sheet towards the other. So they may do, aslope, in a short tunnel;
+    there the grid faces the axis of the ring.
 
     Parameters
     ----------
@@ -48,7 +49,7 @@ def false_struts(grid: Grid, samples: SurfaceSamples, found: Certificate, length
             or np.linalg.norm(middle - grid.nodes[other].mean(axis=0)) < STRUTS_APART * length
             for other in struts
         )
-        if not known and len(struts) < found.handles:
+        if not known and len(struts) < found.handles and faces_outwards(grid, ring):
             facing, cosine = sheets_beside(grid.nodes[ring], samples, length)
             if (facing > FACE_EACH_OTHER and cosine > ALONG_WAY) or has_sheets_within(
                 grid.nodes[ring], samples, length
@@ -61,6 +62,17 @@ def false_struts(grid: Grid, samples: SurfaceSamples, found: Certificate, length
     words = f"joins parts of the scan that face each other by a strut {words_of_number(around, 3)}{unit} around{more}"
     at, *also = (place_of(grid.nodes[ring].mean(axis=0) + grid.origin) for ring in struts[:PLACES_KEPT])
     return [Fault("strut", words, at, tuple(also))]
+
+
+def faces_outwards(grid: Grid, ring: np.ndarray) -> bool:
+    """Whether a grid faces away from the axis of a ring of nodes (K,), as around a limb or a strut, not towards it, as in a tunnel."""
+    own = grid.nodes[grid.triangles[np.isin(grid.triangles, ring).any(axis=1)]]
+    areas = np.cross(own[:, 1] - own[:, 0], own[:, 2] - own[:, 0])
+    axis = _axis(grid.nodes[ring])
+    away = own.mean(axis=1) - grid.nodes[ring].mean(axis=0)
+    away -= np.outer(away @ axis, axis)
+    away /= np.maximum(np.linalg.norm(away, axis=1, keepdims=True), 1e-300)
+    return bool((areas * away).sum() > 0.0)
 
 
 def sheets_beside(ring: np.ndarray, samples: SurfaceSamples, length: float) -> tuple[float, float]:
@@ -100,12 +112,16 @@ def has_sheets_within(ring: np.ndarray, samples: SurfaceSamples, length: float) 
 def _around(ring: np.ndarray, samples: SurfaceSamples, length: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the axis (3,) of a ring (K, 3), the samples (N,) around or within it, and their places from its middle (N, 3)."""
     middle = ring.mean(axis=0)
-    off = ring - middle
-    axis = np.cross(off, np.roll(off, -1, axis=0)).sum(axis=0)
-    axis /= max(float(np.linalg.norm(axis)), 1e-300)
     away = samples.surface.mean - middle
-    near = np.flatnonzero((away**2).sum(axis=1) < (np.linalg.norm(off, axis=1).max() + length) ** 2)
-    return axis, near, away[near]
+    near = np.flatnonzero((away**2).sum(axis=1) < (np.linalg.norm(ring - middle, axis=1).max() + length) ** 2)
+    return _axis(ring), near, away[near]
+
+
+def _axis(ring: np.ndarray) -> np.ndarray:
+    """Return the axis (3,) of a ring (K, 3)."""
+    off = ring - ring.mean(axis=0)
+    axis = np.cross(off, np.roll(off, -1, axis=0)).sum(axis=0)
+    return np.asarray(axis / max(float(np.linalg.norm(axis)), 1e-300))
 
 
 def rings_around_handles(grid: Grid) -> list[np.ndarray]:
