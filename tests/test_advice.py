@@ -708,6 +708,21 @@ def test_where_limbs_are_too_thin_a_length_is_found_between_the_usual_one_and_th
     assert len(made) <= MOST_TRIED + TRIED_AROUND
 
 
+@pytest.mark.parametrize("kind", ["cover", "torn"])
+def test_shorter_lengths_come_first_where_members_are_too_long_for_thin_parts(
+    kind: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An atlas vertebra got no length: longer ones, torn at its openings as well, took all grids."""
+    cloud = cloud_of("limpet")
+    usual = Advice(cloud, st.Settings(length=1.0)).suggest()
+    made = counted_runs(monkeypatch, lambda length: length < 0.8 * usual)
+    failed = SimpleNamespace(faults=(Fault(kind, "it fails"),), left_out=())
+    monkeypatch.setattr(LengthTrial, "_failed", property(lambda trial: None if trial.passed else failed))
+    advice = Advice(cloud, st.Settings(length=1.0))
+    assert advice.suggest() < 0.8 * usual and advice.passes
+    assert max(made) <= 1.45 * usual
+
+
 def thin_bowl(count: int = 40_000, radius: float = 60.0, wall: float = 6.0) -> np.ndarray:
     """A half sphere that is a thin solid, with a flat lip."""
     rng = np.random.default_rng(3)

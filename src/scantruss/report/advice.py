@@ -268,8 +268,8 @@ class Advice:
             if not cuts_everywhere(getattr(self._found.get(self._as_tried(wall)), "fault", None)):
                 yield ladder.NEXT_LENGTH * wall / self._usual, ladder.FIRST_TWO
         usual = self._tried_usual()
-        leaves_out = usual is not None and (usual.passed or usual.leaves_out)
-        first, *others = ladder.SHORTER_FIRST if leaves_out else ladder.LONGER_FIRST
+        shorter = usual is not None and (usual.passed or usual.is_too_long)
+        first, *others = ladder.SHORTER_FIRST if shorter else ladder.LONGER_FIRST
         steps = [first, *([] if wall is None else [(wall / self._usual, ladder.SOME_MORE)]), *others]
         yield from sorted(steps, key=lambda step: step[1]) if self._loses_limbs() else steps
 

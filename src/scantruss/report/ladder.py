@@ -21,7 +21,7 @@ LONGER_FIRST = (
     (1.4, A_FEW), (2.0, A_FEW), (1.0, SOME_MORE), (2.8, A_FEW), (1 / 1.4, A_FEW), (2.0, SOME_MORE), (1.4, SOME_MORE),
     (2.8, SOME_MORE), (0.5, A_FEW),
 )  # fmt: skip
-#: the same where the usual one passes, or leaves out much: members are too long for thin parts rather than too short
+#: the same where the usual one passes, leaves out much or is torn: members are too long for thin parts rather than too short
 SHORTER_FIRST = (
     (1 / 1.4, A_FEW), (1.4, A_FEW), (1.0, SOME_MORE), (0.5, A_FEW), (2.0, A_FEW), (1 / 1.4, SOME_MORE), (1.4, SOME_MORE),
     (2.8, A_FEW), (2.0, SOME_MORE),

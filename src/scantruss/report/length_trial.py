@@ -55,6 +55,13 @@ class LengthTrial:
         return self._failed is not None and any(fault.kind == "cover" for fault in self._failed.faults)
 
     @property
+    def is_too_long(self) -> bool:
+        """Whether the first grid fails as its members are too long for thin parts of the scan: it leaves them out or is torn there."""
+        return self.leaves_out or (
+            self._failed is not None and any(fault.kind == "torn" for fault in self._failed.faults)
+        )
+
+    @property
     def loses_limbs(self) -> bool:
         """Whether the first grid fails as limbs are too thin for its members; longer ones lose more."""
         return (
