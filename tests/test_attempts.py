@@ -16,6 +16,7 @@ from typed import known
 import scantruss as st
 from scantruss.attempts.course import IS_BETTER, RIDGES_GIVEN_UP, WITHOUT_DOUBTFUL_RIDGES, WITHOUT_RODS, AttemptCourse
 from scantruss.attempts.limit import MOST_RUNS
+from scantruss.attempts.looks import is_better_without_ridges
 from scantruss.attempts.table import (
     AS_ASKED,
     PLAIN_BODY,
@@ -268,7 +269,7 @@ def test_a_grid_that_gives_up_ridges_is_followed_by_one_without_any_and_the_bett
     monkeypatch.setattr(course_of + "lost_ridges", lambda *_: [])
     for name in ("with_moved_corners", "with_ridges_lost", "with_ridges_given_up"):
         monkeypatch.setattr(course_of + name, lambda grid, *_: grid)
-    monkeypatch.setattr(course_of + "_doubts_ridges", lambda grid: grid is first)
+    monkeypatch.setattr(course_of + "doubts_ridges", lambda grid, _: grid is first)
     monkeypatch.setitem(IS_BETTER, WITHOUT_DOUBTFUL_RIDGES, lambda *_: is_better)
     cloud, asked = st.PointCloud.from_array(CLOUDS["cap"][0]), st.Settings(length=1.0)
     course = AttemptCourse(cloud, asked)
@@ -307,6 +308,55 @@ def test_a_round_tube_is_as_even_as_without_ridges() -> None:
     """Members ran along folds of 30 degrees that noise makes sharper here and there: their lengths varied by .12 in place of .06."""
     grid = st.grid_from_points(knotted_tube(), st.Settings(length=1.0))
     assert grid.quality.length_cv < 0.07 and not known(grid.certificate).warnings
+
+
+def bone(sides: int = 8, count: int = 30_000) -> np.ndarray:
+    """Points (N, 3) of a bent bar of so many sides, 4.5 to 7.5 members round for members of length 1: each side is narrower than these."""
+    rng = np.random.default_rng(3)
+    around, along = rng.uniform(0.0, 2.0 * np.pi, count), rng.uniform(0.0, 16.0, count)
+    half = np.pi / sides
+    radius = (
+        3.0 / np.pi * (1.0 + 0.25 * np.cos(np.pi * along / 8.0)) * np.cos(half) / np.cos(around % (2.0 * half) - half)
+    )
+    places = [radius * np.cos(around) + 0.016 * (along - 8.0) ** 2, radius * np.sin(around), along]
+    return np.column_stack(places) + rng.normal(0.0, 0.01, (count, 3))
+
+
+@compiled_only
+def test_a_bone_is_as_even_as_without_ridges_unless_a_ridge_angle_is_chosen() -> None:
+    """Chains along folds that are closer than a member is long: lengths varied by .16, and the grid was farther off."""
+    plain, chosen = (st.grid_from_points(bone(), st.Settings(length=1.0, ridge_angle=angle)) for angle in (40.0, 39.0))
+    assert plain.quality.length_cv < 0.08 and not plain.line_sets
+    assert chosen.line_sets and chosen.quality.length_cv > plain.quality.length_cv
+
+
+@pytest.mark.parametrize(
+    ("cv", "p99", "triangle_p99", "kinds", "is_better"),
+    [
+        (0.06, 0.21, 0.20, (), True),
+        (0.09, 0.20, 0.20, (), False),  # hardly evener
+        (0.06, 0.23, 0.20, (), False),
+        (0.06, 0.20, 0.23, (), False),  # the points are of columns
+        (0.06, 0.20, 0.20, ("lost",), False),
+        (0.06, 0.20, 0.20, ("short",), False),
+    ],
+)
+def test_a_grid_without_ridges_is_taken_where_it_is_far_evener_and_hardly_farther_off(
+    cv: float, p99: float, triangle_p99: float, kinds: tuple[str, ...], is_better: bool
+) -> None:
+    def judged(cv: float, p99: float, triangle_p99: float, kinds: tuple[str, ...]) -> Any:
+        certificate = SimpleNamespace(
+            warnings=[SimpleNamespace(kind=kind) for kind in kinds],
+            scan_distance=SimpleNamespace(p95=0.1, p99=p99),
+            triangle_distance=SimpleNamespace(p95=0.1, p99=triangle_p99),
+            missing=0.0,
+        )
+        return SimpleNamespace(
+            certificate=certificate, quality=SimpleNamespace(length_cv=cv, stretch_cv=None, shape_mean=0.98)
+        )
+
+    without, other = judged(cv, p99, triangle_p99, kinds), judged(0.1, 0.2, 0.2, ("angle",))
+    assert is_better_without_ridges(without, other) == is_better
 
 
 def refused(kind: str) -> st.CertificateError:

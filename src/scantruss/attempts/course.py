@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 from ..check.limits import with_ridges_given_up, with_ridges_lost
 from ..errors import CertificateError, FrontError, OneSidedError, ScanTrussError
-from ..improve.longer_search import is_no_worse
 from .limit import (
     AttemptLimit,
     fails_as_sparse,
@@ -20,11 +19,12 @@ from .limit import (
     only_sparse,
 )
 from .looks import (
-    POOR_MEMBERS,
     AskedScan,
     breaks_limb,
+    doubts_ridges,
     follows_more,
     gaps_spanned,
+    is_better_without_ridges,
     jumps_between_walls,
     keeps_columns,
     runs_along_rods,
@@ -44,12 +44,12 @@ WITHOUT_RODS = "passes, but along rods: without them"
 BETWEEN_WALLS = "passes, but jumps between thin walls: with their sides distinguished"
 BREAKS_LIMB = "the grid is torn at a limb thinner than its members"
 RIDGES_GIVEN_UP = "ridges given up near the faults"
-WITHOUT_DOUBTFUL_RIDGES = "passes, but ends ridges where they go on: without any"
+WITHOUT_DOUBTFUL_RIDGES = "passes, but with ridges that may be none: without any"
 # rows of grids that pass before the sides of walls were ever distinguished
 TRIED_BEFORE_WALLS = (AS_ASKED, RIDGES_GIVEN_UP)
 
 # attempts that are made after one that passes, and when their grids are taken in its place
-IS_BETTER = {BETWEEN_WALLS: follows_more, WITHOUT_DOUBTFUL_RIDGES: is_no_worse}
+IS_BETTER = {BETWEEN_WALLS: follows_more, WITHOUT_DOUBTFUL_RIDGES: is_better_without_ridges}
 
 
 class AttemptCourse:
@@ -64,8 +64,8 @@ class AttemptCourse:
       points judged, as most may be outliers, once. None passes without.
     - `BETWEEN_WALLS`: the first grid passes but may jump between the sides of thin walls; once, as the last attempt. That which follows
       more of the scan is taken.
-    - `WITHOUT_DOUBTFUL_RIDGES`: a grid passes with ridges given up or broken off, as along a round tube; once, as the last attempt.
-      That which is as even, as regular and as near to the scan is taken.
+    - `WITHOUT_DOUBTFUL_RIDGES`: a grid passes with ridges given up or broken off, as along a round tube, or with uneven members, as along
+      bones; once, as the last attempt. It is taken where it is far evener and hardly farther from the scan.
     - least effort: none passes, and sheets are not too near each other; all attempts again, once: more effort never gives less. Those
       are left out that fail by their one front, which is the same with any effort, or by the limbs that were cut off before it.
 
@@ -174,7 +174,7 @@ class AttemptCourse:
             self._follows = Attempt(
                 self._settings.replace(thin_walls=True), is_trial=attempt.is_trial, row=BETWEEN_WALLS
             )
-        elif _doubts_ridges(grid) and not attempt.is_trial:
+        elif doubts_ridges(grid, self._settings) and not attempt.is_trial:
             without = attempt.settings.replace(ridge_angle=0.0)
             self._follows = Attempt(without, row=WITHOUT_DOUBTFUL_RIDGES)
         self._passed = grid
@@ -247,9 +247,3 @@ class AttemptCourse:
         if self._advice and isinstance(worst, FrontError) and not (only_leaves_out(worst) or only_sparse(worst)):
             return type(worst)(f"{worst}; {self._advice}", worst.grid, worst.where)
         return worst
-
-
-def _doubts_ridges(grid: Grid) -> bool:
-    """Whether a grid gives up ridges or breaks them off, and has poor members: they may be none."""
-    kinds = {warning.kind for warning in grid.certificate.warnings} if grid.certificate is not None else set()
-    return "ridge" in kinds and bool(kinds & POOR_MEMBERS)

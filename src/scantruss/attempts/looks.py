@@ -11,6 +11,7 @@ from ..check.distances import measure_distances
 from ..check.sheets import broken_limb, webbed_limb
 from ..constraints.ridges import find_ridges
 from ..front.orientation_field import usual_starts
+from ..grid.line_sets import RIDGE, sets_of
 from ..surface.chosen_samples import KEPT, LIMB, ROD
 from ..surface.samples import sample_surface
 from ..surface.shape import wall_of_surface
@@ -19,7 +20,7 @@ from ..surface.supports import are_columns, column_stays, free_columns, lies_und
 
 if TYPE_CHECKING:
     from ..errors import Place
-    from ..grid.certificate import Certificate
+    from ..grid.certificate import Certificate, Spread
     from ..grid.grid import Grid
     from ..scan.cloud import PointCloud
     from ..settings import Settings
@@ -42,9 +43,11 @@ MISSING_ALIKE = 0.005  # share of the scan by which a grid may miss more than an
 LEAST_IN_COLUMNS = 0.005  # least share of a scan in the columns that it stands on where z may not be up
 # by how much nearer a hundredth of the points must lie, in members, where members are unevener by 1 (std of their lengths / mean)
 NEARER_FOR_UNEVENER = 2.0
-# by how much the members of a grid that follows more ridges may be unevener, and how many times as far a hundredth of the points off it
+# by how much the members of a grid that follows more ridges may be unevener than those of another, and how many times as far points off
+# one of the two
 UNEVENER_BESIDE_RIDGES, FARTHER_BESIDE_RIDGES = 0.03, 1.1
 POOR_MEMBERS = {"angle", "short", "long", "folded"}  # kinds of warnings
+UNEVEN = 0.08  # std of the lengths of members over their mean from which on ridges may be none, or too many for members so long
 
 # what a scan shows of outliers, edges and slits it shows before limbs are cut off, which takes most of the time of its samples
 NO_LIMBS: dict[str, Any] = {"limb_girth": 0.0}
@@ -318,6 +321,43 @@ def follows_ridges_as_well(grid: Grid, other: Grid) -> bool:
     is_even = _variation(grid) <= _variation(other) + UNEVENER_BESIDE_RIDGES
     is_near = found.scan_distance.p99 <= FARTHER_BESIDE_RIDGES * known.scan_distance.p99
     return is_even and is_near and _poor_members(found) <= _poor_members(known)
+
+
+def doubts_ridges(grid: Grid, asked: Settings) -> bool:
+    """Whether ridges of a grid may be none: it gives some up or breaks them off and has poor members, or its members are uneven.
+
+    Nobody doubts for uneven members alone what a ridge angle was chosen for.
+    """
+    kinds = {warning.kind for warning in grid.certificate.warnings} if grid.certificate is not None else set()
+    if "ridge" in kinds and kinds & POOR_MEMBERS:
+        return True
+    is_usual = asked.ridge_angle == type(asked).ridge_angle
+    return is_usual and _variation(grid) > UNEVEN and bool(sets_of(grid, RIDGE))
+
+
+def is_better_without_ridges(grid: Grid, other: Grid) -> bool:
+    """Whether a grid without ridges is far evener than one with them, as regular and hardly farther from the scan.
+
+    It has no more kinds of poor members, and cuts across no edge where the other does not. Its triangles tell how near it is as well as
+    the points, most of which may be of columns that both leave out.
+    """
+    found, known = grid.certificate, other.certificate
+    if found is None or known is None or _variation(grid) >= _variation(other) - UNEVENER_BESIDE_RIDGES:
+        return False
+    spreads = ((found.scan_distance, known.scan_distance), (found.triangle_distance, known.triangle_distance))
+    is_near = all(own is None or with_ridges is None or _is_near(own, with_ridges) for own, with_ridges in spreads)
+    kinds = [{warning.kind for warning in each.warnings} for each in (found, known)]
+    return (
+        is_near
+        and grid.quality.shape_mean >= other.quality.shape_mean
+        and found.missing <= known.missing + MISSING_ALIKE
+        and not (kinds[0] - kinds[1]) & {"lost", *POOR_MEMBERS}
+    )
+
+
+def _is_near(one: Spread, two: Spread) -> bool:
+    """Whether distances are hardly larger than others."""
+    return one.p95 <= FARTHER_BESIDE_RIDGES * two.p95 and one.p99 <= FARTHER_BESIDE_RIDGES * two.p99
 
 
 def places_of_poor_members(grid: Grid) -> list[Place]:

@@ -189,7 +189,7 @@ def grid_with_notes(
         "plain_body": "no grid passes with all thin limbs and slits of this body, so it is made without, as with --plain-body",
         "keep_rods": "no grid follows the columns, scaffold or cables of this scan: what was found of them is left out",
         "limb_girth": f"no grid passes with all thin limbs cut off, so it is made as with --limb-girth {made.limb_girth:g}",
-        "ridge_angle": "no grid keeps the ridges of this scan, so it is made without, as with --ridge-angle 0",
+        "ridge_angle": "a grid along the folds of this scan fails or is far less even, so it has no ridges, as with --ridge-angle 0",
         "box_size": f"no grid passes with the usual sample spacing, so it is made as with --box-size {made.box_size or 0:g}",
         "effort": f"no grid passes with --effort {settings.effort}, so it is made as with --effort {made.effort}",
         "method": "no grid of the default method passes its certificate here, so it is made by the method of the paper",
