@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..check.distances import measure_distances
+from ..check.folds import fold_angles
 from ..check.sheets import broken_limb, webbed_limb
 from ..constraints.ridges import find_ridges
 from ..front.orientation_field import usual_starts
@@ -48,6 +49,7 @@ NEARER_FOR_UNEVENER = 2.0
 UNEVENER_BESIDE_RIDGES, FARTHER_BESIDE_RIDGES = 0.03, 1.1
 POOR_MEMBERS = {"angle", "short", "long", "folded"}  # kinds of warnings
 UNEVEN = 0.08  # std of the lengths of members over their mean from which on ridges may be none, or too many for members so long
+BLUNT = 120.0  # angle between the triangles at half of the members along ridges from which on a grid without may be as near [degree]
 
 # what a scan shows of outliers, edges and slits it shows before limbs are cut off, which takes most of the time of its samples
 NO_LIMBS: dict[str, Any] = {"limb_girth": 0.0}
@@ -324,15 +326,16 @@ def follows_ridges_as_well(grid: Grid, other: Grid) -> bool:
 
 
 def doubts_ridges(grid: Grid, asked: Settings) -> bool:
-    """Whether ridges of a grid may be none: it gives some up or breaks them off and has poor members, or its members are uneven.
+    """Whether ridges of a grid may be none: it gives some up or breaks them off and has poor members, or they are blunt and members uneven.
 
     Nobody doubts for uneven members alone what a ridge angle was chosen for.
     """
     kinds = {warning.kind for warning in grid.certificate.warnings} if grid.certificate is not None else set()
     if "ridge" in kinds and kinds & POOR_MEMBERS:
         return True
-    is_usual = asked.ridge_angle == type(asked).ridge_angle
-    return is_usual and _variation(grid) > UNEVEN and bool(sets_of(grid, RIDGE))
+    if asked.ridge_angle != type(asked).ridge_angle or _variation(grid) <= UNEVEN or not sets_of(grid, RIDGE):
+        return False
+    return bool(np.nanmedian(fold_angles(grid)[grid.edge_on_line]) > BLUNT)
 
 
 def is_better_without_ridges(grid: Grid, other: Grid) -> bool:
