@@ -335,7 +335,8 @@ def doubts_ridges(grid: Grid, asked: Settings) -> bool:
         return True
     if asked.ridge_angle != type(asked).ridge_angle or _variation(grid) <= UNEVEN or not sets_of(grid, RIDGE):
         return False
-    return bool(np.nanmedian(fold_angles(grid)[grid.edge_on_line]) > BLUNT)
+    angles = fold_angles(grid)[grid.edge_on_line & (grid.edge_uses == 2)]
+    return bool(len(angles) and np.median(angles) > BLUNT)
 
 
 def is_better_without_ridges(grid: Grid, other: Grid) -> bool:
