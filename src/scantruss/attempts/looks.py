@@ -44,11 +44,11 @@ MISSING_ALIKE = 0.005  # share of the scan by which a grid may miss more than an
 LEAST_IN_COLUMNS = 0.005  # least share of a scan in the columns that it stands on where z may not be up
 # by how much nearer a hundredth of the points must lie, in members, where members are unevener by 1 (std of their lengths / mean)
 NEARER_FOR_UNEVENER = 2.0
-# by how much the members of a grid that follows more ridges may be unevener than those of another, and how many times as far points off
-# one of the two
+# by how much the members of a grid that follows more ridges may be unevener than those of another, and how many times as far from the
+# scan the farther one of the two may be
 UNEVENER_BESIDE_RIDGES, FARTHER_BESIDE_RIDGES = 0.03, 1.1
 POOR_MEMBERS = {"angle", "short", "long", "folded"}  # kinds of warnings
-UNEVEN = 0.08  # std of the lengths of members over their mean from which on ridges may be none, or too many for members so long
+UNEVEN = 0.075  # std of the lengths of members over their mean from which on ridges may be none, or too many for members so long
 BLUNT = 120.0  # angle between the triangles at half of the members along ridges from which on a grid without may be as near [degree]
 
 # what a scan shows of outliers, edges and slits it shows before limbs are cut off, which takes most of the time of its samples
