@@ -14,9 +14,9 @@ from small_clouds import ball, cap, sheet
 from typed import known
 
 import scantruss as st
+from scantruss.attempts.better import doubts_ridges, is_better_without_ridges
 from scantruss.attempts.course import IS_BETTER, RIDGES_GIVEN_UP, WITHOUT_DOUBTFUL_RIDGES, WITHOUT_RODS, AttemptCourse
 from scantruss.attempts.limit import MOST_RUNS
-from scantruss.attempts.looks import is_better_without_ridges
 from scantruss.attempts.table import (
     AS_ASKED,
     PLAIN_BODY,
@@ -29,6 +29,7 @@ from scantruss.attempts.table import (
 )
 from scantruss.errors import FrontError
 from scantruss.grid.certificate import Certificate, Fault, LeftOut
+from scantruss.grid.line_sets import RIDGE
 from scantruss.surface import samples
 
 NAMES = [row.name for row in ROWS_TRIED]
@@ -328,6 +329,23 @@ def test_a_bone_is_as_even_as_without_ridges_unless_a_ridge_angle_is_chosen() ->
     plain, chosen = (st.grid_from_points(bone(), st.Settings(length=1.0, ridge_angle=angle)) for angle in (40.0, 39.0))
     assert plain.quality.length_cv < 0.08 and not plain.line_sets
     assert chosen.line_sets and chosen.quality.length_cv > plain.quality.length_cv
+
+
+@pytest.mark.parametrize(("angle", "cv", "doubts"), [(150.0, 0.1, True), (150.0, 0.07, False), (90.0, 0.1, False)])
+def test_uneven_members_raise_doubts_along_blunt_folds_alone(
+    angle: float, cv: float, doubts: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A further grid cost machine parts a third of their time for nothing. An edge of the boundary has no angle."""
+    grid: Any = SimpleNamespace(
+        certificate=None,
+        quality=SimpleNamespace(length_cv=cv, stretch_cv=None),
+        line_sets=[SimpleNamespace(kind=RIDGE, name="ridge 1", nodes=np.arange(3), length=lambda _: 2.0)],
+        edge_on_line=np.array([True, True, True, False]),
+        edge_uses=np.array([2, 2, 1, 2]),
+    )
+    monkeypatch.setattr("scantruss.attempts.better.fold_angles", lambda _: np.array([angle, angle, np.nan, 180.0]))
+    assert doubts_ridges(grid, st.Settings(length=1.0)) == doubts
+    assert not doubts_ridges(grid, st.Settings(length=1.0, ridge_angle=30.0))
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,8 @@ from marks import compiled_only
 from numpy.typing import NDArray
 
 import scantruss as st
-from scantruss.attempts.looks import ROUGH_SCAN, AskedScan, follows_more, jumps_between_walls
+from scantruss.attempts.better import follows_more
+from scantruss.attempts.looks import ROUGH_SCAN, AskedScan, jumps_between_walls
 from scantruss.attempts.table import Attempt, attempts
 from scantruss.constraints.ridges import find_ridges
 from scantruss.kernels.geometry.boxes import new_boxes

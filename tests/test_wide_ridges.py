@@ -11,7 +11,7 @@ import pytest
 from marks import compiled_only
 
 from scantruss import Grid, PointCloud, Settings, grid_from_points
-from scantruss.attempts.looks import follows_better
+from scantruss.attempts.better import follows_better
 from scantruss.attempts.lost_ridges import lost_ridges
 from scantruss.attempts.table import Attempt
 from scantruss.boundary.curves import length_along

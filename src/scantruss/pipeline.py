@@ -11,9 +11,9 @@ from time import perf_counter
 
 import numpy as np
 
+from .attempts.better import follows_better, follows_ridges_as_well, places_of_poor_members
 from .attempts.course import AttemptCourse
 from .attempts.limit import AttemptLimit
-from .attempts.looks import follows_better, follows_ridges_as_well, places_of_poor_members
 from .attempts.table import AS_ASKED, Attempt, places_of_fault
 from .boundary.find import find_boundary
 from .candidates import advance_fronts, best_that_passes, improve_fronts

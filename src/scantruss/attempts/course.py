@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from ..check.limits import with_ridges_given_up, with_ridges_lost
 from ..errors import CertificateError, FrontError, OneSidedError, ScanTrussError
+from .better import doubts_ridges, follows_more, gaps_spanned, is_better_without_ridges
 from .limit import (
     AttemptLimit,
     fails_as_sparse,
@@ -21,10 +22,6 @@ from .limit import (
 from .looks import (
     AskedScan,
     breaks_limb,
-    doubts_ridges,
-    follows_more,
-    gaps_spanned,
-    is_better_without_ridges,
     jumps_between_walls,
     keeps_columns,
     runs_along_rods,

@@ -44,6 +44,10 @@ class LengthTrial:
         """The certificate of the first grid, where that fails."""
         return getattr(getattr(self.fault, "grid", None), "certificate", None)
 
+    def _fails_by(self, *kinds: str) -> bool:
+        """Whether the first grid has a fault of any of some kinds."""
+        return self._failed is not None and any(fault.kind in kinds for fault in self._failed.faults)
+
     @property
     def has_one_fault(self) -> bool:
         """Whether a single fault keeps the first grid from passing."""
@@ -52,14 +56,12 @@ class LengthTrial:
     @property
     def leaves_out(self) -> bool:
         """Whether the first grid fails as it leaves out too much of the scan."""
-        return self._failed is not None and any(fault.kind == "cover" for fault in self._failed.faults)
+        return self._fails_by("cover")
 
     @property
     def is_too_long(self) -> bool:
         """Whether the first grid fails as its members are too long for thin parts of the scan: it leaves them out or is torn there."""
-        return self.leaves_out or (
-            self._failed is not None and any(fault.kind == "torn" for fault in self._failed.faults)
-        )
+        return self._fails_by("cover", "torn")
 
     @property
     def loses_limbs(self) -> bool:
