@@ -475,8 +475,9 @@ def test_a_length_that_loses_little_is_suggested_where_the_next_above_passes_at_
         ((0.4, 0.5), []),
     ],
 )
-def test_where_only_thin_limbs_are_missing_the_option_that_accepts_that_is_named(
-    lost: tuple[float, ...], said: list[str]
+@pytest.mark.parametrize(("kind", "without"), [("limbs", "its thin limbs"), ("sparse", "{:.0%} of the scan")])
+def test_where_grids_only_leave_out_too_much_the_option_that_accepts_that_is_named(
+    kind: str, without: str, lost: tuple[float, ...], said: list[str]
 ) -> None:
     """Of lengths that lose about as much the shortest, as it follows more of the rest."""
 
@@ -484,11 +485,14 @@ def test_where_only_thin_limbs_are_missing_the_option_that_accepts_that_is_named
         found = Certificate(
             "", 0.5, True, True, 1, 1, 1, 1, 1, 0, missing=share, faults=(Fault("cover", "leaves out"), *more)
         )
-        found = replace(found, left_out=(LeftOut("limbs", 9, share),))
+        found = replace(found, left_out=(LeftOut(kind, 9, share),))
         return LengthTrial(length, None, st.CertificateError("it fails", cast(Any, SimpleNamespace(certificate=found))))
 
     trials = [missing(0.5, 0.01, Fault("torn", "is torn")), *(missing(k, share) for k, share in enumerate(lost, 1))]
-    assert accepted_line(trials) == [f"with --length {each} a grid without its thin limbs passes" for each in said]
+    parts = [without.format(lost[int(each[0]) - 1]) for each in said]
+    assert accepted_line(trials) == [
+        f"with --length {each} a grid without {part} passes" for each, part in zip(said, parts, strict=True)
+    ]
 
 
 def refused_with(crossings: int, *others: Fault) -> st.CertificateError:

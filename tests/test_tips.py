@@ -172,6 +172,39 @@ def test_a_tip_alone_whose_node_stands_off_the_scan_is_given_up_before_anything_
 
 
 @compiled_only
+@pytest.mark.parametrize("away", [0.5 * SUSPECT_REACH, 1.5 * SUSPECT_REACH])
+def test_a_tip_alone_that_fails_far_from_it_is_tried_once_more_with_what_is_far_from_it_at_rest(
+    away: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    mesh, front, samples = improved(eared_ball())
+    tip = find_tips(mesh, front, samples)[0]
+    search = tip_search.TipSearch(cast(Any, SimpleNamespace(mesh=mesh)), samples, *cast(Any, (0, 0, 0)))
+    place = tuple(tip + samples.origin + np.array([0.0, away, 0.0]))
+    failed, passed = (
+        SimpleNamespace(certificate=SimpleNamespace(faults=[SimpleNamespace(where=place)]), checked_grid=None),
+        SimpleNamespace(certificate=SimpleNamespace(faults=[]), checked_grid="passes"),
+    )
+    outcomes, resting = [failed, passed], list[np.ndarray]()
+    monkeypatch.setattr(tip_search, "put_down", lambda mesh: resting.append(mesh.net.kind == AT_REST))
+    monkeypatch.setattr(tip_search, "misses_at_most", lambda grid, _: grid is not None)
+    monkeypatch.setattr(tip_search.TipSearch, "of_scan", ())
+    monkeypatch.setattr(tip_search.TipSearch, "judged", lambda *_: outcomes.pop(0))
+    monkeypatch.setattr(tip_search.TipSearch, "stands_off", lambda *_: False)
+    found = search.reach([tip])
+    if away < SUSPECT_REACH:
+        assert found is None
+        assert len(search.given_up) == len(resting) == 1
+        return
+    assert cast(Any, found) is passed
+    assert not search.given_up
+    free = (mesh.net.degree > 0) & ~resting[0]
+    far = np.linalg.norm(mesh.net.nodes - tip, axis=1) > tip_search.SETTLES_AROUND_TIP
+    assert 0 < (free & ~far).sum() < free.sum()
+    np.testing.assert_array_equal(resting[1][free], far[free])
+    np.testing.assert_array_equal(mesh.net.kind == AT_REST, resting[0])
+
+
+@compiled_only
 def test_a_grid_reaches_the_end_of_an_ear(monkeypatch: pytest.MonkeyPatch) -> None:
     points, settings = eared_ball(1), st.Settings(length=1.0)
     grid = st.grid_from_points(points, settings)

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..check.distances import distances_to_grid
-from ..kernels.mesh.grid import AT_REST, Net
 from .candidate import Candidate, grid_of, judged
 from .optimize import searched_again
 from .perturbation import LONGER, Spared
+from .working_mesh import at_rest
 
 if TYPE_CHECKING:
     from ..boundary.find import Boundary
@@ -65,7 +63,7 @@ def search_on(
             last = taken
         spared = Spared(faulty, SPARED_AT_FAULT * mesh.length), Spared(lost, SPARED_AT_LOSS * mesh.length)
         chance = number * (FREE_TURNS + SPARING_TURNS) + (0 if is_free else turn - FREE_TURNS + 1)
-        with _at_rest(mesh.net, ~Spared(held, spared[0].reach).away(mesh.net.nodes)):
+        with at_rest(mesh.net, ~Spared(held, spared[0].reach).away(mesh.net.nodes)):
             grid = searched_again(
                 mesh, candidate.front, samples, constraints, candidate.settings, LONGER, spared, chance
             )
@@ -90,18 +88,6 @@ def search_on(
             lost = np.concatenate([lost, _places(samples)[is_lost]])
     if candidate.judged is not first:
         candidate.end()
-
-
-@contextmanager
-def _at_rest(net: Net, which: np.ndarray) -> Iterator[None]:
-    """Let some nodes of a net (C,) bool stay where they are for a while."""
-    moving = which & (net.degree > 0) & (net.kind < AT_REST)
-    kinds = net.kind[moving]
-    net.kind[moving] = AT_REST
-    try:
-        yield
-    finally:
-        net.kind[moving] = kinds
 
 
 def _is_no_poorer(now: Judged, first: Judged, least: Grid) -> bool:

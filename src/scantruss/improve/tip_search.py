@@ -11,8 +11,10 @@ import numpy as np
 from ..check.hanging import any_stands_off
 from .candidate import Candidate, grid_of, judged, misses_at_most
 from .optimize import put_down, searched_again
+from .perturbation import Spared
 from .rings import finish_rings
-from .tips import find_tips, put_on_tips, suspects_apart
+from .tips import find_tips, is_suspect, put_on_tips, suspects_apart
+from .working_mesh import at_rest
 
 if TYPE_CHECKING:
     from ..boundary.find import Boundary
@@ -23,6 +25,9 @@ if TYPE_CHECKING:
     from ..surface.samples import SurfaceSamples
 
 TURNS_OF_TIPS = 5  # times that nodes are put on tips
+SETTLES_AROUND_TIP = (
+    4.0  # distance from a tip within which the grid settles where it failed far from it [member lengths]
+)
 MOST_MISSED = 0.2  # largest share of the scan that a grid may miss where nodes are put on tips
 
 
@@ -75,26 +80,45 @@ class TipSearch:
     def reach(self, tips: Sequence[np.ndarray]) -> Judged | None:
         """Put nodes on the tips (3,) where nothing goes wrong, and give up the others; the grid then, None where it is as before.
 
-        Tips near a fault are tried one by one. Ends: each call has fewer tips than the one that made it.
+        Tips near a fault are tried one by one; where one of these then fails far from it, once more with what is far from it at rest.
+        Ends: each call has fewer tips than the one that made it.
         """
         mesh = self.candidate.mesh
         kept = mesh.copied()
-        if put_on_tips(mesh, tips):
-            grid = put_down(mesh, *self.of_scan)
-            # of a tip alone nobody asks what else is wrong
-            now = None if len(tips) == 1 and self.stands_off(grid) else self.judged(grid)
-            if now is not None and misses_at_most(now.checked_grid, MOST_MISSED):
-                return now
+        if not put_on_tips(mesh, tips):
+            self.given_up.extend(tips)
+            return None
+        now = self.put_down(tips)
+        if now is not None and len(tips) == 1 and not _has_nothing_wrong(now) and self.fails_far_from(tips[0], now):
             mesh.restore(kept)
-            if now is not None and len(tips) > 1:
-                faults = [np.array(each.where) - self.samples.origin for each in now.certificate.faults if each.where]
-                harmless, suspects = suspects_apart(tips, faults, mesh.length)
-                found = self.reach(harmless)
-                for tip in suspects:
-                    found = self.reach([tip]) or found
-                return found
-        self.given_up.extend(tips)
-        return None
+            put_on_tips(mesh, tips)
+            with at_rest(mesh.net, Spared(np.array(tips), SETTLES_AROUND_TIP * mesh.length).away(mesh.net.nodes)):
+                now = self.put_down(tips)
+        if now is not None and _has_nothing_wrong(now):
+            return now
+        mesh.restore(kept)
+        if now is None or len(tips) == 1:
+            self.given_up.extend(tips)
+            return None
+        harmless, suspects = suspects_apart(tips, self.places_of_faults(now), mesh.length)
+        found = self.reach(harmless)
+        for tip in suspects:
+            found = self.reach([tip]) or found
+        return found
+
+    def put_down(self, tips: Sequence[np.ndarray]) -> Judged | None:
+        """Put the mesh down and judge the grid; None where a tip alone has nodes that stand off, as nobody asks what else is wrong."""
+        grid = put_down(self.candidate.mesh, *self.of_scan)
+        return None if len(tips) == 1 and self.stands_off(grid) else self.judged(grid)
+
+    def places_of_faults(self, now: Judged) -> list[np.ndarray]:
+        """Return where a grid fails (3,), from the local origin."""
+        return [np.array(each.where) - self.samples.origin for each in now.certificate.faults if each.where]
+
+    def fails_far_from(self, tip: np.ndarray, now: Judged) -> bool:
+        """Whether all faults of a grid whose places are known are far from a tip (3,), which has not caused them."""
+        faults = self.places_of_faults(now)
+        return bool(faults) and not is_suspect(tip, faults, self.candidate.mesh.length)
 
     def is_taken(self, now: Judged, cost: float) -> bool:
         """Take the grid that the mesh has become where it passes as far and is better than one of some cost."""
@@ -105,3 +129,8 @@ class TipSearch:
         if not better:
             candidate.take(before)
         return better
+
+
+def _has_nothing_wrong(now: Judged) -> bool:
+    """Whether nothing is wrong with a grid but that it misses some of the scan, as long as nodes are put on tips."""
+    return misses_at_most(now.checked_grid, MOST_MISSED)

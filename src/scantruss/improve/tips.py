@@ -75,13 +75,17 @@ def suspects_apart(
 
     Where the places do not tell, these are the nearer and the farther half of them.
     """
-    away = [min((float(np.linalg.norm(tip - place)) for place in faults), default=np.inf) for tip in tips]
-    suspect = [distance < SUSPECT_REACH * length for distance in away]
+    suspect = [is_suspect(tip, faults, length) for tip in tips]
     if all(suspect) or not any(suspect):
         suspect = [k >= len(tips) // 2 for k in range(len(tips))]
     return [tip for tip, is_one in zip(tips, suspect, strict=True) if not is_one], [
         tip for tip, is_one in zip(tips, suspect, strict=True) if is_one
     ]
+
+
+def is_suspect(tip: np.ndarray, faults: Sequence[np.ndarray], length: float) -> bool:
+    """Whether a tip (3,) is so near to a fault at one of some places (3,) that a node on it may have caused it."""
+    return any(float(np.linalg.norm(tip - place)) < SUSPECT_REACH * length for place in faults)
 
 
 def _is_at_boundary(mesh: WorkingMesh, place: np.ndarray, reach: float) -> bool:

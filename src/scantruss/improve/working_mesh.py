@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
@@ -321,3 +323,15 @@ def _half_edges(triangles: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarr
     partner = np.full(len(key), -1, np.int64)
     partner[a], partner[b] = b, a
     return start, partner
+
+
+@contextmanager
+def at_rest(net: Net, which: np.ndarray) -> Iterator[None]:
+    """Let some nodes of a net (C,) bool stay where they are for a while."""
+    moving = which & (net.degree > 0) & (net.kind < AT_REST)
+    kinds = net.kind[moving]
+    net.kind[moving] = AT_REST
+    try:
+        yield
+    finally:
+        net.kind[moving] = kinds

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from .advice import Advice
     from .length_trial import LengthTrial
 
-LIMBS_ALIKE = 1.1  # ratio of the shares of the scan on thin limbs up to which they are alike
+LEFT_OUT_ALIKE = 1.1  # ratio of the shares of the scan that grids leave out up to which they are alike
 MOST_WORDS = 2  # kinds of loss, or faults, that are named for a length
 
 
@@ -123,17 +123,18 @@ def advice_lines(advice: Advice, length: float, cloud: PointCloud) -> list[str]:
 
 
 def accepted_line(trials: list[LengthTrial]) -> list[str]:
-    """Return a length whose grid only misses thin limbs, the shortest of those alike, and the option that accepts that; else nothing."""
-    without_limbs = [
-        (trial.length, trial.fault.grid.certificate)
+    """Return a length whose grid only leaves out too much, the shortest of those alike, and the option that accepts that; else nothing."""
+    leaving_out = [
+        (trial, trial.fault.grid.certificate)
         for trial in trials
-        if trial.loses_limbs and trial.fault is not None and only_leaves_out(trial.fault)
+        if trial.leaves_out and trial.fault is not None and only_leaves_out(trial.fault)
     ]
-    least = min((found.missing for _, found in without_limbs), default=1.0)
+    least = min((found.missing for _, found in leaving_out), default=1.0)
     if least > MOST_ACCEPTED:
         return []
-    length, found = next(each for each in without_limbs if each[1].missing <= LIMBS_ALIKE * least)
-    return [f"with --length {length:g} {option_accepting(found)} a grid without its thin limbs passes"]
+    trial, found = next(each for each in leaving_out if each[1].missing <= LEFT_OUT_ALIKE * least)
+    without = "its thin limbs" if trial.loses_limbs else f"{found.missing:.0%} of the scan"
+    return [f"with --length {trial.length:g} {option_accepting(found)} a grid without {without} passes"]
 
 
 def usual_cause(trials: list[LengthTrial], wall: tuple[float, float] = (0.0, 0.0)) -> str:
