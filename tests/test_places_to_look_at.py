@@ -9,6 +9,7 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
+from scipy.spatial import Delaunay
 from small_clouds import sheet
 from small_grids import make_grid
 from typed import known
@@ -551,6 +552,50 @@ def test_a_corner_where_no_scan_is_cannot_be_cut_off() -> None:
             Any, type("Scan", (), known_of_scan)()
         )  # unlike a namespace something that boxes can be kept for
         assert bool(places_aside(grid, guessed, 1.0, samples)) == said
+
+
+def test_a_place_where_members_cut_off_an_acute_edge_is_no_gap() -> None:
+    """Between two sides of a wedge at 60 degrees and its end, where their edge is cut off, a disc is free of points."""
+    slope, cut = np.tan(np.radians(30.0)), 1.2
+    x, z = (each.ravel() for each in np.meshgrid(np.arange(0.0, 4.0, 0.05), np.arange(-5.0, 0.6, 0.05)))
+    sides = [np.column_stack([x, side * slope * x, z]) for side in (-1.0, 1.0)]
+    x, y = (each.ravel() for each in np.meshgrid(np.arange(0.0, 4.0, 0.05), np.arange(-3.0, 3.0, 0.05)))
+    end = np.column_stack([x, y, np.full(len(x), 0.6)])[np.abs(y) < slope * x]
+    chains = [(cut + 0.9, -1.0, 0.5), (cut, -1.0, 0.0), (cut, 1.0, 0.5), (cut + 0.9, 1.0, 0.0)]
+    nodes = np.array([[x, side * slope * x, z + more] for x, side, more in chains for z in range(-3, 4)])
+    number = np.arange(28).reshape(4, 7)
+    triangles = []
+    for one, two in zip(number[:-1], number[1:], strict=True):
+        first, second = (one, two) if nodes[one[0], 2] < nodes[two[0], 2] else (two, one)
+        for k in range(6):
+            pair = [(first[k], first[k + 1], second[k]), (first[k + 1], second[k + 1], second[k])]
+            triangles += pair if first is one else [each[::-1] for each in pair]
+    samples, grid = scanned(np.concatenate([*sides, end]), make_grid(nodes, triangles))
+    assert bridged_gaps(grid, samples, NOTHING, 1.0)[0] == []
+
+
+@pytest.mark.parametrize("seed", [2, 4, 10])
+def test_the_emptiest_places_among_random_points_are_no_openings(seed: int) -> None:
+    """The circles through three points with none inside, of 40,000 in a square; and one in which points were taken away."""
+    rng, turn = np.random.default_rng(seed), np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
+    points = rng.uniform(size=(40000, 2))
+    a, b, c = points[Delaunay(points).simplices].transpose(1, 0, 2)
+    normals = 2.0 * np.stack([b - a, c - a], axis=1)
+    middles = a + np.linalg.solve(normals, 0.25 * (normals**2).sum(axis=2)[..., None])[..., 0]
+    radii = np.linalg.norm(middles - a, axis=1)
+    within = (np.abs(middles - 0.5) < 0.45).all(axis=1)
+    emptiest = np.argsort(np.where(within, radii, 0.0))[-3:]
+    curves = middles[emptiest, None] + 1.05 * radii[emptiest, None, None] * np.column_stack(
+        [np.cos(turn), np.sin(turn)]
+    )
+    flat = np.column_stack([points, np.zeros(len(points))])
+    for curve in curves:
+        around = np.column_stack([curve, np.zeros(len(curve))])
+        assert not is_empty_within(around, by_x(flat))
+        middle = around.mean(axis=0)
+        wide = middle + 2.0 * (around - middle)
+        away = np.linalg.norm(flat - middle, axis=1)
+        assert is_empty_within(wide, by_x(flat[away > 0.95 * np.linalg.norm(wide - middle, axis=1).min()]))
 
 
 def test_an_empty_place_in_a_sparse_part_is_no_opening() -> None:

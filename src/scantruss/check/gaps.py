@@ -36,12 +36,15 @@ SOME_PLACES = 50  # places from which the usual distance is taken
 POINTS_AROUND = 45  # points up to twice that distance from which on an empty place is no accident, as exp(-n/3) tells
 # ... where the emptiest of many places is chosen, which is farther from points than one at random
 POINTS_AROUND_MIDDLE = 60
+# ... where it is the emptiest of a whole scan: that none of n points is within half of their reach has a probability of (3 / 4)^n
+POINTS_AROUND_EMPTIEST = 75
 # sectors of the ring around an empty place, and least number of points in the two that have fewest: where these tell the density, the place
 # is empty at random with a probability of exp(-7)
 SECTORS_OF_RING, LEAST_OF_TWO = 6, 7
 PLACES_ACROSS_GAP = np.stack(np.meshgrid(*[np.linspace(-0.6, 0.6, 7)] * 2), axis=-1).reshape(
     -1, 2
 )  # places around another [its arms]
+LEAST_ALONG = 0.5  # cosine between the normals of a gap and of the surface around it, at least
 MOST_BRIDGED = 1.2  # width of a gap that is open there from which on a grid that bridges it fails [member lengths]
 OPEN_FROM = 0.1  # distance of the boundary from the nearest point from which on a gap there is open [member lengths]
 WIDE_OPENING = 0.5  # longest side from which on an opening that is closed is said [member lengths]
@@ -84,7 +87,9 @@ def _gaps_within(
         return [], []
     normals = _normals(grid)
     some = np.arange(0, len(places), len(places) // SOME_PLACES + 1)
-    usual = np.median([_level(places[at], normals[owner[at]], away[at], points).min(initial=away[at]) for at in some])
+    usual = np.median(
+        [_level(places[at], normals[owner[at]], away[at], points)[0].min(initial=away[at]) for at in some]
+    )
     least = np.maximum(least, FAR_OF_USUAL * usual)
     covering = np.unique(owner[away > (least - NEAR_MIDDLE * members)[owner]])
     extra, theirs = _more_places(grid, covering)
@@ -101,6 +106,10 @@ def _gaps_within(
     edge = points_of_loops(boundary)
     half *= [
         not is_sparse_beside(places[at], normals[owner[at]], r, points, edge) for at, r in zip(far, half, strict=True)
+    ]
+    half *= [
+        bool(r <= 0.0) or _lies_along(places[at], normals[owner[at]], r, samples)
+        for at, r in zip(far, half, strict=True)
     ]
     far, half = far[half > least[far]], half[half > least[far]]
     if not len(far):
@@ -189,7 +198,7 @@ def is_empty_within(curve: np.ndarray, points: np.ndarray, edge: np.ndarray | No
     half = np.array([reach, np.abs((curve - middle) @ across).max()])
     place = _emptiest(middle, half[:, None] * np.stack([along, across]), reach, points)
     away = float(np.linalg.norm(points_within(place, reach, points) - place, axis=1).min(initial=reach))
-    radius = empty_disc(place, normal, away, points)
+    radius = empty_disc(place, normal, away, points, POINTS_AROUND_EMPTIEST)
     return radius > 0.0 and (edge is None or not is_sparse_beside(place, normal, radius, points, edge))
 
 
@@ -210,10 +219,18 @@ def is_sparse_beside(
     around = points_within(place, 3.0 * radius, points) - place
     x, y = np.linalg.svd(normal[None])[2][1:]
     u, v, height = around @ x, around @ y, around @ normal
-    in_ring = (np.abs(height) <= 2.0 * radius) & (np.hypot(u, v) <= 2.0 * radius)
+    level = np.hypot(u, v)
+    in_ring = (np.abs(height) <= level) & (level <= 2.0 * radius)
     sector = ((np.arctan2(v, u) / (2.0 * np.pi) + 0.5) * SECTORS_OF_RING).astype(int) % SECTORS_OF_RING
     count = np.sort(np.bincount(sector[in_ring], minlength=SECTORS_OF_RING))
     return bool(count[:2].sum() < LEAST_OF_TWO)
+
+
+def _lies_along(place: np.ndarray, normal: np.ndarray, radius: float, samples: SurfaceSamples) -> bool:
+    """Whether an empty disc lies along the surface around it: one that cuts off an acute edge or a tip lies across its sides."""
+    surface = samples.surface
+    around = ((surface.mean - place) ** 2).sum(axis=1) <= (2.0 * radius) ** 2
+    return not around.any() or bool(np.median(np.abs(surface.normals[around] @ normal)) >= LEAST_ALONG)
 
 
 def points_within(place: np.ndarray, reach: float, points: np.ndarray) -> np.ndarray:
@@ -239,17 +256,18 @@ def empty_disc(
 
     away : distance of the nearest point; points : (N, 3) by ascending x; least : points around it from which on it is no accident.
     """
-    level = _level(place, normal, away, points)
+    level, height = _level(place, normal, away, points)
     radius = float(level.min(initial=away))
-    return radius if (level <= 2.0 * radius).sum() >= least else 0.0
+    return radius if ((level <= 2.0 * radius) & (np.abs(height) <= level)).sum() >= least else 0.0
 
 
-def _level(place: np.ndarray, normal: np.ndarray, away: float, points: np.ndarray) -> np.ndarray:
-    """Return the distances in the plane at a place of the points near it (K,); parameters as of `empty_disc`."""
+def _level(place: np.ndarray, normal: np.ndarray, away: float, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the distances in the plane at a place of the points near it and their heights over it (K,); parameters as of `empty_disc`."""
     around = points_within(place, 3.0 * away, points) - place
     height = around @ normal
-    level: np.ndarray = np.sqrt(np.maximum((around**2).sum(axis=1) - height**2, 0.0))[np.abs(height) <= 2.0 * away]
-    return level
+    level: np.ndarray = np.sqrt(np.maximum((around**2).sum(axis=1) - height**2, 0.0))
+    near = np.abs(height) <= 2.0 * away
+    return level[near], height[near]
 
 
 def _normals(grid: Grid) -> np.ndarray:
