@@ -44,7 +44,7 @@ SECTORS_OF_RING, LEAST_OF_TWO = 6, 7
 PLACES_ACROSS_GAP = np.stack(np.meshgrid(*[np.linspace(-0.6, 0.6, 7)] * 2), axis=-1).reshape(
     -1, 2
 )  # places around another [its arms]
-LEAST_ALONG = 0.5  # cosine between the normals of a gap and of the surface around it, at least
+FACES_AS_AROUND = 0.5  # least cosine between the normals of a gap and of the surface around it
 MOST_BRIDGED = 1.2  # width of a gap that is open there from which on a grid that bridges it fails [member lengths]
 OPEN_FROM = 0.1  # distance of the boundary from the nearest point from which on a gap there is open [member lengths]
 WIDE_OPENING = 0.5  # longest side from which on an opening that is closed is said [member lengths]
@@ -230,7 +230,7 @@ def _lies_along(place: np.ndarray, normal: np.ndarray, radius: float, samples: S
     """Whether an empty disc lies along the surface around it: one that cuts off an acute edge or a tip lies across its sides."""
     surface = samples.surface
     around = ((surface.mean - place) ** 2).sum(axis=1) <= (2.0 * radius) ** 2
-    return not around.any() or bool(np.median(np.abs(surface.normals[around] @ normal)) >= LEAST_ALONG)
+    return not around.any() or bool(np.median(np.abs(surface.normals[around] @ normal)) >= FACES_AS_AROUND)
 
 
 def points_within(place: np.ndarray, reach: float, points: np.ndarray) -> np.ndarray:
@@ -254,7 +254,8 @@ def empty_disc(
 ) -> float:
     """Return the radius of the disc around a place (3,) that is free of points, 0 where that may be an accident.
 
-    away : distance of the nearest point; points : (N, 3) by ascending x; least : points around it from which on it is no accident.
+    away : distance of the nearest point; points : (N, 3) by ascending x; least : points around it from which on it is no accident, at no
+    more than 45 degrees over the plane.
     """
     level, height = _level(place, normal, away, points)
     radius = float(level.min(initial=away))
