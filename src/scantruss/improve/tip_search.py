@@ -25,9 +25,8 @@ if TYPE_CHECKING:
     from ..surface.samples import SurfaceSamples
 
 TURNS_OF_TIPS = 5  # times that nodes are put on tips
-SETTLES_AROUND_TIP = (
-    4.0  # distance from a tip within which the grid settles where it failed far from it [member lengths]
-)
+# distance from a tip within which alone the grid settles where it failed far from it [member lengths]
+SETTLES_AROUND_TIP = 4.0
 MOST_MISSED = 0.2  # largest share of the scan that a grid may miss where nodes are put on tips
 
 
