@@ -467,6 +467,29 @@ def test_a_length_that_loses_little_is_suggested_where_the_next_above_passes_at_
     assert (advice.suggest() == advice._usual) == at_last
 
 
+@pytest.mark.parametrize("passes_above", [True, False])
+def test_a_length_between_is_suggested_where_the_next_above_it_passes_and_that_above_the_usual_one_fails(
+    passes_above: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def tried(advice: Advice, length: float, most: int = 0) -> LengthTrial:
+        share = length / advice._usual
+        passes = 0.82 < share < 1.05 or (passes_above and 1.1 < share < 1.3)
+        certificate = SimpleNamespace(judged_out=0.0, left_out=(), warnings=())
+        grid = cast(Any, SimpleNamespace(certificate=certificate)) if passes else None
+        trial = advice._found[length] = LengthTrial(length, grid, None if passes else st.FrontError("it fails"))
+        return trial
+
+    monkeypatch.setattr(Advice, "try_length", tried)
+    advice = Advice(cloud_of("limpet"), st.Settings(length=1.0))
+    length = advice.suggest()
+    if not passes_above:
+        assert length == advice._usual
+        return
+    assert length < advice._usual
+    assert known(advice.try_length(length)).passed
+    assert known(advice.try_length(advice.next_above(length))).passed
+
+
 @pytest.mark.parametrize(
     ("lost", "said"),
     [

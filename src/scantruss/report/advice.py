@@ -21,7 +21,7 @@ from ..scan.member_length import exact_range, length_range, round_length
 from ..surface.samples import sample_surface
 from ..surface.size_field import measured_bends
 from . import ladder
-from .following import length_that_follows
+from .following import length_that_follows, shorter_with_next_above
 from .length_trial import LengthTrial, settled
 
 if TYPE_CHECKING:
@@ -154,9 +154,10 @@ class Advice:
 
         It is the first of those tried in turn that passes with what is next above it, both without much of the scan lost; else of
         those that pass with what is next above them the first that loses hardly more than the least; else the next below one that
-        passes, if it passes too; else one that passes, if there is one with another not far above it that passes too, and rather
-        one that loses little; else the usual length. Where none passes, some more are looked at. One that closes openings or loses
-        ridges gives way to one that does not, if that passes and loses no more.
+        passes, if it passes too, or one between the two that passes with what is next above it; else one that passes, if there is
+        one with another not far above it that passes too, and rather one that loses little; else the usual length. Where none
+        passes, some more are looked at. One that closes openings or loses ridges gives way to one that does not, if that passes and
+        loses no more.
         """
         self.is_spent = True
         low, high = length_range(self._cloud)
@@ -192,11 +193,10 @@ class Advice:
             self._try_beside()
         passing = [trial.length for trial in self.tried if trial.passed]
         if passing:
-            below = self.next_below(passing[0])
-            self._count_at(below, ladder.A_FEW)
-            trial = self.try_length(below, ladder.A_FEW)
-            if trial is not None and trial.passed and passing[0] <= ladder.NEARLY_NEXT * below:
-                return below
+            left = ladder.MOST_TRIED + ladder.TRIED_AROUND - self._spent
+            self._count_at(self.next_below(passing[0]), min(max(left, ladder.A_FEW), 3 * ladder.A_FEW))
+            if (shorter := shorter_with_next_above(self, passing[0])) is not None:
+                return shorter
         followed = [one for one in passing if any(one < other <= ladder.NEARLY_NEXT * one for other in passing)]
         complete = [one for one in followed if self._found[one].lost <= ladder.MOST_LOST]
         return min(complete or followed or passing, key=self._far_from_usual, default=self._usual)

@@ -1,10 +1,10 @@
-"""Which length to take in place of one at which openings are closed or ridges lost: the next longer one, or a shorter one."""
+"""Which length to take in place of one that closes openings or loses ridges, or above which the next fails: a longer or a shorter one."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from .ladder import FIRST_TWO, LOST_ALIKE, PASSED_OVER, STEPS_TO_FOLLOW
+from .ladder import A_FEW, BETWEEN, FIRST_TWO, LOST_ALIKE, NEARLY_NEXT, PASSED_OVER, STEPS_TO_FOLLOW, two_digits
 
 if TYPE_CHECKING:
     from .advice import Advice
@@ -67,3 +67,18 @@ def _shorter_that_follows(advice: Advice, trial: LengthTrial) -> float:
             break
         above = shorter
     return trial.length
+
+
+def shorter_with_next_above(advice: Advice, length: float) -> float | None:
+    """Return a length below one that passes which passes too, with what is next above it; None where there is none.
+
+    It is the next below, or one between the two where that fails, as in scans with gaps: what bridges them is too long, shorter members
+    see others.
+    """
+    below = advice.next_below(length)
+    trial = advice.try_length(below, A_FEW)
+    if trial is not None and trial.passed and length <= NEARLY_NEXT * below:
+        return below
+    between = two_digits(BETWEEN * length)
+    tried = (advice.try_length(each, A_FEW) for each in (between, advice.next_above(between)))
+    return between if all(trial is not None and trial.passed for trial in tried) else None

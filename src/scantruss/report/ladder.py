@@ -31,6 +31,7 @@ LAST_LENGTHS = ((1.4, FIRST_TWO), (2.0, FIRST_TWO), (2.8, FIRST_TWO))
 LAST_WITH_LIMBS = ((0.85, 3), (2.0, FIRST_TWO))
 NEARLY_NEXT = 1.45  # ratio of lengths that pass up to which the longer one stands for the next to the shorter
 LINES_OF_A_SCANNER = 5  # fewest lines of points that may be those of a scanner
+BETWEEN = 0.87  # ratio of a length between two, of which the longer passes, to that
 NEXT_LENGTH = 1.4  # a length is suggested if that many times it passes too
 STEPS_TO_FOLLOW = 4  # such steps that are gone down from one that closes openings or loses ridges to one that does not
 PASSED_OVER = 1  # most lengths between that pass and follow no more where it is only ridges or narrow parts
