@@ -87,9 +87,7 @@ def _gaps_within(
         return [], []
     normals = _normals(grid)
     some = np.arange(0, len(places), len(places) // SOME_PLACES + 1)
-    usual = np.median(
-        [_level(places[at], normals[owner[at]], away[at], points)[0].min(initial=away[at]) for at in some]
-    )
+    usual = np.median([_level(places[at], normals[owner[at]], away[at], points).min(initial=away[at]) for at in some])
     least = np.maximum(least, FAR_OF_USUAL * usual)
     covering = np.unique(owner[away > (least - NEAR_MIDDLE * members)[owner]])
     extra, theirs = _more_places(grid, covering)
@@ -105,10 +103,8 @@ def _gaps_within(
     half = np.array([empty_disc(places[at], normals[owner[at]], away[at], points, needed[at]) for at in far])
     edge = points_of_loops(boundary)
     half *= [
-        not is_sparse_beside(places[at], normals[owner[at]], r, points, edge) for at, r in zip(far, half, strict=True)
-    ]
-    half *= [
-        bool(r <= 0.0) or _lies_along(places[at], normals[owner[at]], r, samples)
+        not is_sparse_beside(places[at], normals[owner[at]], r, points, edge)
+        and _lies_along(places[at], normals[owner[at]], r, samples)
         for at, r in zip(far, half, strict=True)
     ]
     far, half = far[half > least[far]], half[half > least[far]]
@@ -219,8 +215,7 @@ def is_sparse_beside(
     around = points_within(place, 3.0 * radius, points) - place
     x, y = np.linalg.svd(normal[None])[2][1:]
     u, v, height = around @ x, around @ y, around @ normal
-    level = np.hypot(u, v)
-    in_ring = (np.abs(height) <= level) & (level <= 2.0 * radius)
+    in_ring = (np.abs(height) <= 2.0 * radius) & (np.hypot(u, v) <= 2.0 * radius)
     sector = ((np.arctan2(v, u) / (2.0 * np.pi) + 0.5) * SECTORS_OF_RING).astype(int) % SECTORS_OF_RING
     count = np.sort(np.bincount(sector[in_ring], minlength=SECTORS_OF_RING))
     return bool(count[:2].sum() < LEAST_OF_TWO)
@@ -228,6 +223,8 @@ def is_sparse_beside(
 
 def _lies_along(place: np.ndarray, normal: np.ndarray, radius: float, samples: SurfaceSamples) -> bool:
     """Whether an empty disc lies along the surface around it: one that cuts off an acute edge or a tip lies across its sides."""
+    if radius <= 0.0:
+        return False
     surface = samples.surface
     around = ((surface.mean - place) ** 2).sum(axis=1) <= (2.0 * radius) ** 2
     return not around.any() or bool(np.median(np.abs(surface.normals[around] @ normal)) >= FACES_AS_AROUND)
@@ -254,21 +251,19 @@ def empty_disc(
 ) -> float:
     """Return the radius of the disc around a place (3,) that is free of points, 0 where that may be an accident.
 
-    away : distance of the nearest point; points : (N, 3) by ascending x; least : points around it from which on it is no accident, at no
-    more than 45 degrees over the plane.
+    away : distance of the nearest point; points : (N, 3) by ascending x; least : points around it from which on it is no accident.
     """
-    level, height = _level(place, normal, away, points)
+    level = _level(place, normal, away, points)
     radius = float(level.min(initial=away))
-    return radius if ((level <= 2.0 * radius) & (np.abs(height) <= level)).sum() >= least else 0.0
+    return radius if (level <= 2.0 * radius).sum() >= least else 0.0
 
 
-def _level(place: np.ndarray, normal: np.ndarray, away: float, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the distances in the plane at a place of the points near it and their heights over it (K,); parameters as of `empty_disc`."""
+def _level(place: np.ndarray, normal: np.ndarray, away: float, points: np.ndarray) -> np.ndarray:
+    """Return the distances in the plane at a place of the points near it (K,); parameters as of `empty_disc`."""
     around = points_within(place, 3.0 * away, points) - place
     height = around @ normal
-    level: np.ndarray = np.sqrt(np.maximum((around**2).sum(axis=1) - height**2, 0.0))
-    near = np.abs(height) <= 2.0 * away
-    return level[near], height[near]
+    level: np.ndarray = np.sqrt(np.maximum((around**2).sum(axis=1) - height**2, 0.0))[np.abs(height) <= 2.0 * away]
+    return level
 
 
 def _normals(grid: Grid) -> np.ndarray:

@@ -87,12 +87,12 @@ class TipSearch:
         if not put_on_tips(mesh, tips):
             self.given_up.extend(tips)
             return None
-        now = self.put_down(tips)
+        now = self.settled(tips)
         if now is not None and len(tips) == 1 and not _has_nothing_wrong(now) and self.fails_far_from(tips[0], now):
             mesh.restore(kept)
             put_on_tips(mesh, tips)
             with at_rest(mesh.net, Spared(np.array(tips), SETTLES_AROUND_TIP * mesh.length).away(mesh.net.nodes)):
-                now = self.put_down(tips)
+                now = self.settled(tips)
         if now is not None and _has_nothing_wrong(now):
             return now
         mesh.restore(kept)
@@ -105,8 +105,8 @@ class TipSearch:
             found = self.reach([tip]) or found
         return found
 
-    def put_down(self, tips: Sequence[np.ndarray]) -> Judged | None:
-        """Put the mesh down and judge the grid; None where a tip alone has nodes that stand off, as nobody asks what else is wrong."""
+    def settled(self, tips: Sequence[np.ndarray]) -> Judged | None:
+        """Put the mesh down and judge its grid; None where a node stands off for a tip alone, as nobody asks what else is wrong."""
         grid = put_down(self.candidate.mesh, *self.of_scan)
         return None if len(tips) == 1 and self.stands_off(grid) else self.judged(grid)
 
