@@ -1,4 +1,4 @@
-"""Struts of a grid between parts of a scan that only face each other, told from handles that the scan has."""
+"""Struts between parts of a scan that only face each other and tunnels through what is closed, told from handles that the scan has."""
 
 import numpy as np
 import pytest
@@ -9,7 +9,7 @@ from typed import known
 
 import scantruss as st
 from scantruss.check.certify import certify
-from scantruss.check.handles import cuts_of_members, false_struts, has_sheets_within, rings_around_handles
+from scantruss.check.handles import cuts_of_members, false_handles, has_sheets_within, rings_around_handles
 
 RADIUS, TUBE, HALF_GAP = 4.0, 1.2, 0.15
 
@@ -30,9 +30,10 @@ def test_a_strut_between_parts_that_face_each_other_is_said_and_a_handle_of_the_
     assert known(whole.certificate).handles == 1
     assert known(whole.certificate).passed
     samples = samples_of(two_balls(), effort="quick")
-    (fault,) = false_struts(
+    (fault,) = false_handles(
         whole.replace(origin=samples.origin, nodes=whole.nodes + whole.origin - samples.origin),
         samples,
+        np.zeros(len(samples.scan)),
         known(whole.certificate),
         1.0,
     )
@@ -54,6 +55,34 @@ def test_a_short_tunnel_is_no_strut() -> None:
     """Its sides face each other, and rings around it lie aslope: this grid was refused."""
     grid = st.grid_from_points(tire(2.0, 1.6, 0.1), st.Settings(length=0.5, effort="quick"))
     assert known(grid.certificate).passed and known(grid.certificate).handles == 1
+
+
+@compiled_only
+@pytest.mark.parametrize("closed", [True, False])
+@pytest.mark.parametrize("height", [0.0, 1.0])
+def test_a_tunnel_across_which_the_scan_has_points_is_a_fault(closed: bool, height: float) -> None:
+    """Plates with blind holes passed with tunnels through their floors, as these are near enough to the grid around."""
+    hole = 1.1
+    settings = st.Settings(length=1.0, effort="quick")
+    scan = tire(hole + 1.6, 1.6, 0.1)
+    grid = st.grid_from_points(scan, settings)
+    assert known(grid.certificate).handles == 1 and known(grid.certificate).passed
+    plan = np.random.default_rng(1).uniform(-hole, hole, (400, 2))
+    floor = np.column_stack([plan, np.full(len(plan), height)])[np.hypot(*plan.T) < hole]
+    samples, boundary = steps_of(st.PointCloud.from_array(scan), settings)[:2]
+    if closed:
+        scan = np.concatenate([scan, floor])
+        samples = samples_of(scan, effort="quick")
+    found = certify(
+        grid.replace(origin=samples.origin, nodes=grid.nodes + grid.origin - samples.origin),
+        samples,
+        boundary,
+        settings,
+    )
+    assert ("tunnel" in {fault.kind for fault in found.faults}) == closed
+    if closed:
+        (fault,) = (fault for fault in found.faults if fault.kind == "tunnel")
+        assert np.linalg.norm(known(fault.where)) < 1.0
 
 
 @compiled_only

@@ -10,7 +10,7 @@ from scipy import ndimage
 
 import scantruss as st
 from scantruss.surface import body
-from scantruss.surface.body import BODIES_KEPT, LIMB_RADIUS, SLIT_RADIUS, _distance, _Lattice, opened_body
+from scantruss.surface.body import BODIES_KEPT, LIMB_RADIUS, SLIT_RADIUS, _distance, _euler, _Lattice, opened_body
 from scantruss.surface.samples import sample_surface
 
 LENGTH, RADIUS, SPACING = 1.0, 4.0, 0.1
@@ -156,6 +156,44 @@ def test_a_slit_is_filled() -> None:
     deep = (np.abs(scan[:, 0]) < 0.3) & (scan[:, 2] > 0.3) & (scan[:, 2] < 2.5) & (np.abs(scan[:, 1]) < 2.5)
     assert opened.slit[deep].mean() > 0.95
     assert not opened.slit[np.abs(scan[:, 0]) > 0.5].any()
+
+
+@pytest.mark.parametrize("thick", [0.35, 0.7])
+def test_the_floor_of_a_blind_hole_stays_however_thin_and_a_limb_beside_it_is_taken_off(thick: float) -> None:
+    """A floor is thin as a limb is, but without it the hole would go through: grids had tunnels through such floors."""
+    rng, low, high = np.random.default_rng(5), np.array([-4.0, -4.0, -1.5]), np.array([4.0, 4.0, 1.5])
+
+    def inside(p: Points) -> NDArray[np.bool_]:
+        hole = (np.hypot(p[:, 0], p[:, 1]) < 1.5) & (p[:, 2] > thick - 1.5)
+        return np.asarray((p > low).all(axis=1) & (p < high).all(axis=1) & ~hole)
+
+    faces = []
+    for axis, places in ((0, (-4.0, 4.0)), (1, (-4.0, 4.0)), (2, (-1.5, thick - 1.5, 1.5))):
+        for place in places:
+            p = rng.uniform(low, high, (9_000, 3))
+            p[:, axis] = place
+            step = 1e-6 * np.eye(3)[axis]
+            faces.append(p[inside(p + step) != inside(p - step)])
+    turn, height = rng.uniform(0.0, 2.0 * np.pi, 3_000), rng.uniform(thick - 1.5, 1.5, 3_000)
+    hole = np.column_stack([1.5 * np.cos(turn), 1.5 * np.sin(turn), height])
+    limb = rod(0.25, np.linspace([3.8, 0.0, 0.0], [7.0, 0.0, 0.0], 20))
+    scan = np.concatenate([*faces, hole, limb[limb[:, 0] > 4.0]])
+    opened = opened_body(scan, LENGTH, SPACING)
+    assert opened is not None and opened.limb[scan[:, 0] > 4.8].all()
+    assert not opened.limb[np.hypot(scan[:, 0], scan[:, 1]) < 2.0].any()
+
+
+@pytest.mark.parametrize(
+    ("holes", "kind"), [([(slice(2, 4), slice(2, 4), slice(None))], 0), ([(slice(2, 4),) * 3], 2), ([], 1)]
+)
+def test_the_euler_characteristic_of_voxels_is_parts_less_tunnels_plus_hollows(
+    holes: list[tuple[slice, ...]], kind: int
+) -> None:
+    block = np.ones((6, 6, 6), np.bool_)
+    for hole in holes:
+        block[hole] = False
+    assert _euler(block) == kind
+    assert _euler(np.concatenate([block, np.zeros_like(block), block])) == 2 * kind
 
 
 def tailed() -> Points:

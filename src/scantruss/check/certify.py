@@ -22,7 +22,7 @@ from .distances import Distances, measure_distances, offsets_from_points
 from .doubtful import doubtful_places
 from .folds import fold_angles
 from .gaps import bridged_gaps, openings_closed
-from .handles import false_struts
+from .handles import false_handles
 from .hanging import hanging_nodes, nodes_off_sheets
 from .irregular import count_irregular
 from .joined import parts_joined
@@ -99,14 +99,17 @@ class Judged:
         missed_at = place_of(samples.scan[farthest_followed(found.scan, followed, members)] + samples.origin)
         rough = samples.moved
         feet = feet_on(grid, samples, found, length)
-        offsets, (gaps, bridged), doubtful, aside, beyond, beside, (apart, struts), bare, peaks = side_by_side(
+        offsets, (gaps, bridged), doubtful, aside, beyond, beside, (apart, false), bare, peaks = side_by_side(
             lambda: _offsets(grid, samples, length),
             lambda: bridged_gaps(grid, samples, boundary, length),
             lambda: [] if settings.boundary else doubtful_places(grid, samples, length, boundary.corners, found.scan),
             lambda: _at_boundary(grid, samples, boundary, found, followed, members, length),
             lambda: boundary_faults(grid, samples, boundary, length),
             lambda: [] if rough else _beside(grid, samples, found, followed, members),
-            lambda: (cut_apart(grid, samples, found, length), false_struts(grid, samples, self.certificate, length)),
+            lambda: (
+                cut_apart(grid, samples, found, length),
+                false_handles(grid, samples, found.scan / members, self.certificate, length),
+            ),
             lambda: mostly_bare(grid, samples, feet, length),
             lambda: [] if rough else rounded_peaks(grid, samples, found, followed, members),
         )
@@ -133,7 +136,7 @@ class Judged:
                 *too_sparse,
                 *too_frayed,
                 *beyond,
-                *struts,
+                *false,
                 *bare,
                 *(each for each in bridged if each.kind == "bridged"),
                 *too_far,

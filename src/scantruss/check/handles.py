@@ -1,4 +1,4 @@
-"""Struts of a grid between sheets that its scan does not join: handles around which the scan faces along them, not outwards."""
+"""Handles of a grid that its scan does not have: struts between sheets that it does not join, and tunnels through what is closed."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ import numpy as np
 from ..boundary.polylines import well_within
 from ..errors import words_of_number
 from ..grid.certificate import Fault, place_of
-from .limits import PLACES_KEPT
+from ..surface.chosen_samples import OUTLIER
+from .limits import PLACES_KEPT, ROUNDED_BY
 
 if TYPE_CHECKING:
     from ..grid.certificate import Certificate
@@ -24,44 +25,96 @@ FACE_EACH_OTHER, ALONG_WAY = 0.4, 0.7
 # samples of a sheet on either side within a ring, near its plane and facing it, from which on it is around a joint of two sheets
 WITHIN_RING, FEWEST_OF_SHEET = 0.6, 3  # [member lengths]
 OFF_RING, FACES_RING = 0.3, 0.7  # distance from the ring from which on they are within it [member lengths], and cosine
+# points away from the grid across a tunnel, no deeper in it than this, cover what of it is so near to one [member lengths]; it is
+# closed where they cover more than a share of it: tunnels of scans have few, near noise
+DEEP_IN_TUNNEL, STEP_ACROSS, COVERS_AROUND, COVERED_ACROSS = 1.5, 0.15, 0.3, 0.6
 STRUTS_APART = 2.0  # rings whose middles are nearer to each other are around one strut [member lengths]
 
 
-def false_struts(grid: Grid, samples: SurfaceSamples, found: Certificate, length: float) -> list[Fault]:
-    """Return a fault where handles of a grid join two sheets of its scan which the scan does not join there.
+def false_handles(
+    grid: Grid, samples: SurfaceSamples, off: np.ndarray, found: Certificate, length: float
+) -> list[Fault]:
+    """Return a fault where a grid has struts that its scan does not have, and one where it has such tunnels.
 
     Around a limb or a handle of the scan its normals point away from the limb. Around a strut between two sheets that only lie near
     each other, as two legs do, they point along it, those of each sheet towards the other. So they may do, aslope, in a short tunnel;
-    there the grid faces the axis of the ring.
+    there the grid faces the axis of the ring. Across a tunnel of the scan there are no points; where there are, as on the floor of a
+    blind hole that is thinner than the samples tell apart, the grid leaves it out.
 
     Parameters
     ----------
+    off : (N,) float64
+        Distance of each point from the grid [member lengths].
     found : of the grid, with how many handles it has
     length : desired member length [scan unit]
     """
-    if not found.handles:
-        return []
     struts: list[np.ndarray] = []
-    for ring in rings_around_handles(grid):
-        middle = grid.nodes[ring].mean(axis=0)
-        known = any(
-            np.isin(ring, other).any()
-            or np.linalg.norm(middle - grid.nodes[other].mean(axis=0)) < STRUTS_APART * length
-            for other in struts
-        )
-        if not known and len(struts) < found.handles and faces_outwards(grid, ring):
-            facing, cosine = sheets_beside(grid.nodes[ring], samples, length)
-            if (facing > FACE_EACH_OTHER and cosine > ALONG_WAY) or has_sheets_within(
-                grid.nodes[ring], samples, length
-            ):
-                struts.append(ring)
-    if not struts:
+    tunnels: list[np.ndarray] = []
+    count, away = found.handles or 0, samples.scan[(off > ROUNDED_BY) & (samples.judged != OUTLIER)]
+    for ring in rings_around_handles(grid) if count else []:
+        outwards = faces_outwards(grid, ring)
+        known, is_false = (struts, _is_strut) if outwards else (tunnels, _is_closed)
+        if len(known) == count or _is_beside(ring, known, grid, STRUTS_APART * length):
+            continue
+        if is_false(grid.nodes[ring], samples, away, length):
+            known.append(ring)
+    joins, opens = "joins parts of the scan that face each other by a strut", "has a tunnel where the scan is closed,"
+    return [*_fault("strut", joins, struts, grid), *_fault("tunnel", opens, tunnels, grid)]
+
+
+def _is_strut(ring: np.ndarray, samples: SurfaceSamples, _: np.ndarray, length: float) -> bool:
+    """Whether a ring (K, 3) is around a strut between sheets of a scan."""
+    facing, cosine = sheets_beside(ring, samples, length)
+    return (facing > FACE_EACH_OTHER and cosine > ALONG_WAY) or has_sheets_within(ring, samples, length)
+
+
+def _is_closed(ring: np.ndarray, _: SurfaceSamples, away: np.ndarray, length: float) -> bool:
+    """Whether points away from the grid (N, 3) close a tunnel at a ring (K, 3) of it."""
+    return share_covered(ring, away, length) > COVERED_ACROSS
+
+
+def _is_beside(ring: np.ndarray, known: list[np.ndarray], grid: Grid, apart: float) -> bool:
+    """Whether a ring (K,) of nodes lies where one of those known does, or shares a node with it."""
+    middle = grid.nodes[ring].mean(axis=0)
+    return any(
+        np.isin(ring, other).any() or np.linalg.norm(middle - grid.nodes[other].mean(axis=0)) < apart for other in known
+    )
+
+
+def _fault(kind: str, words: str, rings: list[np.ndarray], grid: Grid) -> list[Fault]:
+    """Return the fault of some rings, of the first its girth; nothing of none."""
+    if not rings:
         return []
-    around = float(np.linalg.norm(grid.nodes[struts[0]] - grid.nodes[np.roll(struts[0], 1)], axis=1).sum())
-    unit, more = f" {grid.unit}" if grid.unit else "", f" ({len(struts)} such places)" if len(struts) > 1 else ""
-    words = f"joins parts of the scan that face each other by a strut {words_of_number(around, 3)}{unit} around{more}"
-    at, *also = (place_of(grid.nodes[ring].mean(axis=0) + grid.origin) for ring in struts[:PLACES_KEPT])
-    return [Fault("strut", words, at, tuple(also))]
+    around = float(np.linalg.norm(grid.nodes[rings[0]] - grid.nodes[np.roll(rings[0], 1)], axis=1).sum())
+    unit, more = f" {grid.unit}" if grid.unit else "", f" ({len(rings)} such places)" if len(rings) > 1 else ""
+    at, *also = (place_of(grid.nodes[ring].mean(axis=0) + grid.origin) for ring in rings[:PLACES_KEPT])
+    return [Fault(kind, f"{words} {words_of_number(around, 3)}{unit} around{more}", at, tuple(also))]
+
+
+def share_covered(ring: np.ndarray, away: np.ndarray, length: float) -> float:
+    """Return how much of the inside of a ring (K, 3) has points before or behind it that are away from the grid (N, 3)."""
+    from scipy.spatial import cKDTree
+
+    middle = ring.mean(axis=0)
+    near = away - middle
+    near = near[(near**2).sum(axis=1) < (np.linalg.norm(ring - middle, axis=1).max() + length) ** 2]
+    axis = _axis(ring)
+    across = np.linalg.svd(axis[None])[2][1:]
+    edge = _edge(ring, across)
+    low, high = edge.min(axis=0), edge.max(axis=0)
+    steps = (np.arange(a, b, STEP_ACROSS * length) for a, b in zip(low, high, strict=True))
+    places = np.stack(np.meshgrid(*steps), axis=-1).reshape(-1, 2)
+    places = places[well_within(places, edge, STEP_ACROSS * length)]
+    near = near[np.abs(near @ axis) < DEEP_IN_TUNNEL * length] @ across.T
+    if not len(places) or not len(near):
+        return 0.0
+    return float((cKDTree(near).query(places)[0] < COVERS_AROUND * length).mean())
+
+
+def _edge(ring: np.ndarray, across: np.ndarray) -> np.ndarray:
+    """Return a ring (K, 3) seen along its axis, with the middles of its members (2K, 2)."""
+    edge = (ring - ring.mean(axis=0)) @ across.T
+    return np.concatenate([edge, 0.5 * (edge + np.roll(edge, -1, axis=0))], axis=1).reshape(-1, 2)
 
 
 def faces_outwards(grid: Grid, ring: np.ndarray) -> bool:
@@ -103,8 +156,7 @@ def has_sheets_within(ring: np.ndarray, samples: SurfaceSamples, length: float) 
     faces = -samples.surface.normals[near] @ axis * np.sign(height) > FACES_RING
     faces &= np.abs(height) < WITHIN_RING * length
     across = np.linalg.svd(axis[None])[2][1:]
-    edge = (ring - ring.mean(axis=0)) @ across.T
-    edge = np.concatenate([edge, 0.5 * (edge + np.roll(edge, -1, axis=0))], axis=1).reshape(-1, 2)
+    edge = _edge(ring, across)
     sides = height[faces][well_within(away[faces] @ across.T, edge, OFF_RING * length)] > 0.0
     return bool(min(sides.sum(), (~sides).sum()) >= FEWEST_OF_SHEET)
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from hashlib import sha256
-from itertools import chain, pairwise
+from itertools import chain, pairwise, product
 from typing import NamedTuple
 
 import numpy as np
@@ -259,6 +259,39 @@ def _beyond_ball(voxels: Voxels, radius: float, deep: float, lattice: _Lattice) 
     return near
 
 
+def _without_walls(limbs: Voxels, body: Voxels) -> Voxels:
+    """Return which parts of limbs (X, Y, Z) are none that wall off a hollow or close a hole: without those a body would have a tunnel."""
+    from scipy import ndimage
+
+    part, count = ndimage.label(limbs, np.ones((3, 3, 3), np.bool_))
+    kept = np.ones(count + 1, np.bool_)
+    for number, box in enumerate(ndimage.find_objects(part), start=1):
+        around = tuple(slice(max(side.start - 1, 0), side.stop + 1) for side in box)
+        own = body[around]
+        kept[number] = _euler(own & (part[around] != number)) >= _euler(own)
+    kept[0] = False
+    return np.asarray(kept[part])
+
+
+def _euler(voxels: Voxels) -> int:
+    """Return the Euler characteristic of some voxels (X, Y, Z) that hang together where they touch: parts less tunnels plus hollows."""
+    filled = np.pad(voxels, 1)
+    total = 0
+    for axes in product(
+        (False, True), repeat=3
+    ):  # cells of the voxels' grid that are wide along no axis, along one, two, all
+        cells = filled
+        for axis, wide in enumerate(axes):
+            if not wide:
+                one, other = (
+                    tuple(slice(begin, end) if each == axis else slice(None) for each in range(3))
+                    for begin, end in ((0, -1), (1, None))
+                )
+                cells = cells[one] | cells[other]
+        total += (-1) ** sum(axes) * int(cells.sum())
+    return total
+
+
 def _islands(body: Voxels, before: Voxels) -> Voxels:
     """Return the parts of a body (X, Y, Z) that hung on what was taken off it: of each part before, all but the largest that is left."""
     from scipy import ndimage
@@ -281,7 +314,7 @@ def _open_and_close(points: np.ndarray, body: Voxels, lattice: _Lattice, length:
 
     if not (_distance(~body, lattice, LIMB_RADIUS * length) >= LIMB_RADIUS * length).any():  # pockets of an open sheet
         return None
-    limbs = _beyond_ball(body, LIMB_RADIUS * length, DEPTH_OF_LIMBS * length, lattice)
+    limbs = _without_walls(_beyond_ball(body, LIMB_RADIUS * length, DEPTH_OF_LIMBS * length, lattice), body)
     body = body & ~limbs
     slits = _beyond_ball(~body, SLIT_RADIUS * length, DEPTH_OF_LIMBS * length, lattice)
     islands = _islands(body | slits, body | limbs)
