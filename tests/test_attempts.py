@@ -15,7 +15,14 @@ from typed import known
 
 import scantruss as st
 from scantruss.attempts.better import doubts_ridges, is_better_without_ridges
-from scantruss.attempts.course import IS_BETTER, RIDGES_GIVEN_UP, WITHOUT_DOUBTFUL_RIDGES, WITHOUT_RODS, AttemptCourse
+from scantruss.attempts.course import (
+    IS_BETTER,
+    RIDGES_GIVEN_UP,
+    WITH_LEAST_EFFORT,
+    WITHOUT_DOUBTFUL_RIDGES,
+    WITHOUT_RODS,
+    AttemptCourse,
+)
 from scantruss.attempts.limit import MOST_RUNS
 from scantruss.attempts.table import (
     AS_ASKED,
@@ -281,6 +288,45 @@ def test_a_grid_that_gives_up_ridges_is_followed_by_one_without_any_and_the_bett
     course = AttemptCourse(cloud, asked)
     driven(course, {AS_ASKED: first})  # without ridges none passes
     assert course.outcome() is first
+
+
+@pytest.mark.parametrize("is_better", [False, True])
+@pytest.mark.parametrize("missing", [0.001, 0.03])
+def test_a_plain_body_that_drops_parts_is_followed_by_the_least_effort_and_the_better_is_taken(
+    missing: float, is_better: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A token with raised letters: 4.4 % were missing, with the least effort 0.8 %."""
+
+    def after(self: Attempt, fault: FrontError, cloud: st.PointCloud) -> Attempt | None:
+        follows = self.row == WITH_LEAST_EFFORT and not self.faults
+        return replace(self, faults=((1.0, 0.0, 0.0),)) if follows else None
+
+    course_of, drops = "scantruss.attempts.course.", missing > 0.005
+    for name in ("doubts_ridges", "runs_along_rods", "stands_on_columns", "jumps_between_walls"):
+        monkeypatch.setattr(course_of + name, lambda *_: False)
+    monkeypatch.setattr(course_of + "breaks_limb", lambda *_: None)
+    monkeypatch.setattr(course_of + "lost_ridges", lambda *_: [])
+    for name in ("with_moved_corners", "with_ridges_lost", "with_ridges_given_up"):
+        monkeypatch.setattr(course_of + name, lambda grid, *_: grid)
+    monkeypatch.setattr(Attempt, "after", after)
+    monkeypatch.setattr(Attempt, "ridges_given_up", lambda *_: [])
+    monkeypatch.setitem(IS_BETTER, WITH_LEAST_EFFORT, lambda *_: is_better)
+    body, asked = (
+        cast(Any, SimpleNamespace(certificate=SimpleNamespace(missing=missing, warnings=(), left_out=())))
+        for _ in range(2)
+    )
+    cloud, settings = st.PointCloud.from_array(CLOUDS["cap"][0]), st.Settings(length=1.0)
+    tried = [Attempt(settings), Attempt(settings.replace(plain_body=True), row=PLAIN_BODY)]
+    course, made = AttemptCourse(cloud, settings, tried), []
+    for attempt in course:
+        made.append(attempt)
+        if attempt.row == PLAIN_BODY or (attempt.row == WITH_LEAST_EFFORT and attempt.faults):
+            course.passed(attempt, body if attempt.row == PLAIN_BODY else asked)
+        else:
+            course.failed(attempt, FrontError("a fault"))
+    assert [each.row for each in made] == [AS_ASKED, PLAIN_BODY, *[WITH_LEAST_EFFORT] * 2 * drops]
+    assert all(changed_between(settings, each.settings) == {"effort"} for each in made[2:])
+    assert course.outcome() is (asked if is_better and drops else body)
 
 
 def knotted_tube(sides: int = 12, count: int = 30_000) -> np.ndarray:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from ..check.limits import with_ridges_given_up, with_ridges_lost
 from ..errors import CertificateError, FrontError, OneSidedError, ScanTrussError
-from .better import doubts_ridges, follows_more, gaps_spanned, is_better_without_ridges
+from .better import MISSING_ALIKE, doubts_ridges, follows_more, gaps_spanned, is_better_without_ridges
 from .limit import (
     AttemptLimit,
     fails_as_sparse,
@@ -42,11 +42,16 @@ BETWEEN_WALLS = "passes, but jumps between thin walls: with their sides distingu
 BREAKS_LIMB = "the grid is torn at a limb thinner than its members"
 RIDGES_GIVEN_UP = "ridges given up near the faults"
 WITHOUT_DOUBTFUL_RIDGES = "passes, but with ridges that may be none: without any"
+WITH_LEAST_EFFORT = "passes, but without what is taken for limbs and slits: as asked, with the least effort"
 # rows of grids that pass before the sides of walls were ever distinguished
 TRIED_BEFORE_WALLS = (AS_ASKED, RIDGES_GIVEN_UP)
 
 # attempts that are made after one that passes, and when their grids are taken in its place
-IS_BETTER = {BETWEEN_WALLS: follows_more, WITHOUT_DOUBTFUL_RIDGES: is_better_without_ridges}
+IS_BETTER = {
+    BETWEEN_WALLS: follows_more,
+    WITHOUT_DOUBTFUL_RIDGES: is_better_without_ridges,
+    WITH_LEAST_EFFORT: follows_more,
+}
 
 
 class AttemptCourse:
@@ -63,6 +68,8 @@ class AttemptCourse:
       more of the scan is taken.
     - `WITHOUT_DOUBTFUL_RIDGES`: a grid passes with ridges given up or broken off, as along a round tube, or with uneven members, as along
       bones; once, as the last attempt. It is taken where it is far evener and hardly farther from the scan.
+    - `WITH_LEAST_EFFORT`: only the plain body passes, and leaves out a part of the scan; as asked with the least effort, as the last
+      attempt, with ridges given up where it fails near them. That which follows more of the scan is taken: more effort never gives less.
     - least effort: none passes, and sheets are not too near each other; all attempts again, once: more effort never gives less. Those
       are left out that fail by their one front, which is the same with any effort, or by the limbs that were cut off before it.
 
@@ -174,7 +181,17 @@ class AttemptCourse:
         elif doubts_ridges(grid, self._settings) and not attempt.is_trial:
             without = attempt.settings.replace(ridge_angle=0.0)
             self._follows = Attempt(without, row=WITHOUT_DOUBTFUL_RIDGES)
+        elif self._drops_parts(attempt, grid):
+            self._follows = Attempt(self._settings.replace(effort=LEAST_EFFORT), row=WITH_LEAST_EFFORT)
         self._passed = grid
+
+    def _drops_parts(self, attempt: Attempt, grid: Grid) -> bool:
+        """Whether a grid that passes leaves out a part of the scan that one with less effort may follow."""
+        only_body = attempt.settings.plain_body and not self._settings.plain_body and not attempt.is_trial
+        found = grid.certificate
+        if not only_body or self._settings.effort == LEAST_EFFORT or found is None:
+            return False
+        return found.missing > MISSING_ALIKE
 
     def failed(self, attempt: Attempt, fault: ScanTrussError) -> None:
         """Note that an attempt gives no grid that passes.
@@ -185,6 +202,9 @@ class AttemptCourse:
             The fault, where it is one of the settings that were asked for.
         """
         if attempt.row == WITHOUT_DOUBTFUL_RIDGES:
+            return
+        if attempt.row == WITH_LEAST_EFFORT:
+            self._follows = attempt.after(fault, self._cloud) if isinstance(fault, FrontError) else None
             return
         if attempt.row == BETWEEN_WALLS:
             if attempt.starts is None:  # once more, with a front that makes all of its nodes itself
