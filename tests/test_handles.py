@@ -9,7 +9,14 @@ from typed import known
 
 import scantruss as st
 from scantruss.check.certify import certify
-from scantruss.check.handles import cuts_of_members, false_handles, has_sheets_within, rings_around_handles
+from scantruss.check.handles import (
+    COVERED_ACROSS,
+    cuts_of_members,
+    false_handles,
+    has_sheets_within,
+    rings_around_handles,
+    share_covered,
+)
 
 RADIUS, TUBE, HALF_GAP = 4.0, 1.2, 0.15
 
@@ -83,6 +90,19 @@ def test_a_tunnel_across_which_the_scan_has_points_is_a_fault(closed: bool, heig
     if closed:
         (fault,) = (fault for fault in found.faults if fault.kind == "tunnel")
         assert np.linalg.norm(known(fault.where)) < 1.0
+
+
+@pytest.mark.parametrize(("radius", "is_closed"), [(0.6, False), (0.45, False), (0.0, True)])
+def test_the_walls_of_a_tunnel_narrower_than_its_ring_do_not_close_it_and_a_cone_of_points_does(
+    radius: float, is_closed: bool
+) -> None:
+    turn = np.linspace(0.0, 2.0 * np.pi, 6, endpoint=False)
+    ring = 0.9 * np.column_stack([np.cos(turn), np.sin(turn), np.zeros(6)])
+    rng = np.random.default_rng(0)
+    around, height = rng.uniform(0.0, 2.0 * np.pi, 2_000), rng.uniform(-1.0, 1.0, 2_000)
+    out = radius + np.abs(height) * (0.65 if radius == 0.0 else 0.1)
+    walls = np.column_stack([out * np.cos(around), out * np.sin(around), height])
+    assert (share_covered(ring, walls, 1.0) > COVERED_ACROSS) == is_closed
 
 
 @compiled_only

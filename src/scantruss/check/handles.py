@@ -9,8 +9,8 @@ import numpy as np
 from ..boundary.polylines import well_within
 from ..errors import words_of_number
 from ..grid.certificate import Fault, place_of
-from ..surface.chosen_samples import OUTLIER
 from .limits import PLACES_KEPT, ROUNDED_BY
+from .missed import points_wanted
 
 if TYPE_CHECKING:
     from ..grid.certificate import Certificate
@@ -26,9 +26,9 @@ FACE_EACH_OTHER, ALONG_WAY = 0.4, 0.7
 WITHIN_RING, FEWEST_OF_SHEET = 0.6, 3  # [member lengths]
 OFF_RING, FACES_RING = 0.3, 0.7  # distance from the ring from which on they are within it [member lengths], and cosine
 # points away from the grid across a tunnel, no deeper in it than this, cover what of it is so near to one [member lengths]; it is
-# closed where they cover more than a share of it: tunnels of scans have few, near noise
-DEEP_IN_TUNNEL, STEP_ACROSS, COVERS_AROUND, COVERED_ACROSS = 1.5, 0.15, 0.3, 0.6
-STRUTS_APART = 2.0  # rings whose middles are nearer to each other are around one strut [member lengths]
+# closed where they cover more than a share of its inner half, which the walls of a narrower tunnel leave free
+DEEP_IN_TUNNEL, STEP_ACROSS, COVERS_AROUND, INNER_PART, COVERED_ACROSS = 1.5, 0.1, 0.2, 0.5, 0.75
+STRUTS_APART = 2.0  # rings whose middles are nearer to each other are around one strut, or tunnel [member lengths]
 
 
 def false_handles(
@@ -38,8 +38,8 @@ def false_handles(
 
     Around a limb or a handle of the scan its normals point away from the limb. Around a strut between two sheets that only lie near
     each other, as two legs do, they point along it, those of each sheet towards the other. So they may do, aslope, in a short tunnel;
-    there the grid faces the axis of the ring. Across a tunnel of the scan there are no points; where there are, as on the floor of a
-    blind hole that is thinner than the samples tell apart, the grid leaves it out.
+    there the grid faces the axis of the ring. Across a tunnel of the scan there are no points but of other pieces; where there are,
+    as on the floor of a blind hole that is thinner than the samples tell apart, the grid leaves it out.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def false_handles(
     """
     struts: list[np.ndarray] = []
     tunnels: list[np.ndarray] = []
-    count, away = found.handles or 0, samples.scan[(off > ROUNDED_BY) & (samples.judged != OUTLIER)]
+    count, away = found.handles or 0, samples.scan[points_wanted(samples) & (off > ROUNDED_BY)]
     for ring in rings_around_handles(grid) if count else []:
         outwards = faces_outwards(grid, ring)
         known, is_false = (struts, _is_strut) if outwards else (tunnels, _is_closed)
@@ -92,7 +92,7 @@ def _fault(kind: str, words: str, rings: list[np.ndarray], grid: Grid) -> list[F
 
 
 def share_covered(ring: np.ndarray, away: np.ndarray, length: float) -> float:
-    """Return how much of the inside of a ring (K, 3) has points before or behind it that are away from the grid (N, 3)."""
+    """Return how much of the inner half of a ring (K, 3) has points before or behind it that are away from the grid (N, 3)."""
     from scipy.spatial import cKDTree
 
     middle = ring.mean(axis=0)
@@ -100,11 +100,10 @@ def share_covered(ring: np.ndarray, away: np.ndarray, length: float) -> float:
     near = near[(near**2).sum(axis=1) < (np.linalg.norm(ring - middle, axis=1).max() + length) ** 2]
     axis = _axis(ring)
     across = np.linalg.svd(axis[None])[2][1:]
-    edge = _edge(ring, across)
-    low, high = edge.min(axis=0), edge.max(axis=0)
-    steps = (np.arange(a, b, STEP_ACROSS * length) for a, b in zip(low, high, strict=True))
-    places = np.stack(np.meshgrid(*steps), axis=-1).reshape(-1, 2)
-    places = places[well_within(places, edge, STEP_ACROSS * length)]
+    radius = INNER_PART * float(np.linalg.norm(ring - middle, axis=1).mean())
+    steps = np.arange(-radius, radius, STEP_ACROSS * length)
+    places = np.stack(np.meshgrid(steps, steps), axis=-1).reshape(-1, 2)
+    places = places[np.hypot(*places.T) < radius]
     near = near[np.abs(near @ axis) < DEEP_IN_TUNNEL * length] @ across.T
     if not len(places) or not len(near):
         return 0.0

@@ -18,10 +18,15 @@ if TYPE_CHECKING:
     from .distances import Distances
 
 
+def points_wanted(samples: SurfaceSamples) -> np.ndarray:
+    """Return which points (N,) bool count as missing where a grid is far from them: those it is to follow, and limbs and slits cut off."""
+    wanted: np.ndarray = np.isin(samples.judged, (KEPT, LIMB, SLIT)) & ~samples.elsewhere
+    return wanted
+
+
 def points_missed(samples: SurfaceSamples, distance: np.ndarray, reach: np.ndarray) -> np.ndarray:
     """Return which points (N,) bool a grid is to follow and misses; parameters as of `points_left_out`."""
-    wanted = np.isin(samples.judged, (KEPT, LIMB, SLIT)) & ~samples.elsewhere
-    missed: np.ndarray = wanted & (distance > reach)
+    missed: np.ndarray = points_wanted(samples) & (distance > reach)
     return missed
 
 

@@ -277,9 +277,8 @@ def _euler(voxels: Voxels) -> int:
     """Return the Euler characteristic of some voxels (X, Y, Z) that hang together where they touch: parts less tunnels plus hollows."""
     filled = np.pad(voxels, 1)
     total = 0
-    for axes in product(
-        (False, True), repeat=3
-    ):  # cells of the voxels' grid that are wide along no axis, along one, two, all
+    # cells of the lattice: corners, which are wide along no axis, edges along one, sides along two, voxels along all
+    for axes in product((False, True), repeat=3):
         cells = filled
         for axis, wide in enumerate(axes):
             if not wide:
