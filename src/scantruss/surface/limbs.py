@@ -13,11 +13,10 @@ from ..kernels.geometry.components import component_labels
 from ..kernels.scan.nearby import nearest_places
 from ..kernels.surface.girths import mark_opposite
 from ..kernels.surface.local_surface import Surface, flood
-from ..kernels.surface.rods import spreads_around
 from ..runtime.parallel import run_in_parts
 from .given_normals import GivenNormals
 from .pieces import LEAST_TRIANGLES, TRIANGLE_AREA, sample_areas
-from .rods import line_like
+from .rods import line_like, moments_around
 from .tubes import (
     FINE_SAMPLES,
     HALF_SECTION,
@@ -108,7 +107,8 @@ def _suspects(surface: Surface, boxes: SearchBoxes, girth: float, smooth: bool) 
     marks = np.zeros(len(surface.mean), np.bool_)
     run_in_parts(len(marks), LIMBS_PER_THREAD, mark_opposite, surface, boxes, SUSPECT_WITHIN * girth / 3.0, marks)
     if not smooth:
-        marks |= _along_lines(surface, boxes, girth)
+        others = np.flatnonzero(~marks)
+        marks[others] = _along_lines(surface, boxes, girth, others)
     if marks.sum() < FEWEST_OF_LIMB:
         return marks
     beside = surface.neighbors
@@ -117,12 +117,10 @@ def _suspects(surface: Surface, boxes: SearchBoxes, girth: float, smooth: bool) 
     return marks
 
 
-def _along_lines(surface: Surface, boxes: SearchBoxes, girth: float) -> np.ndarray:
-    """Return which samples (S,) bool lie along a line: on a limb hardly wider than they are, whose normals tell nothing."""
-    count, middle = np.empty(len(surface.mean), np.int64), np.empty_like(surface.mean)
-    moments = np.empty((len(surface.mean), 3, 3))
-    every = np.ones(len(surface.mean), np.bool_)
-    spreads_around(surface.mean, boxes, every, surface.length * girth / 3.0, moments, middle, count)
+def _along_lines(surface: Surface, boxes: SearchBoxes, girth: float, which: np.ndarray) -> np.ndarray:
+    """Return which of some samples (K,) lie along a line, (K,) bool: on a limb hardly wider than they are, whose normals tell nothing."""
+    every, reach = np.ones(len(surface.mean), np.bool_), surface.length * girth / 3.0
+    moments, _, count = moments_around(surface.mean, boxes, every, reach, which)
     return line_like(np.linalg.eigvalsh(moments)) & (count >= FEWEST_ALONG_LINE)
 
 

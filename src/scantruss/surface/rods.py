@@ -6,12 +6,15 @@ import math
 
 import numpy as np
 
+from ..kernels.geometry.boxes import SearchBoxes
 from ..kernels.geometry.components import component_labels
 from ..kernels.surface.rods import spreads_around
+from ..runtime.parallel import run_in_parts
 from .linked_samples import Linked
 
 COARSE_REACH = 1.0  # radius of the neighbourhood that shows whether a sample is of a rod [member lengths]
 FINE_REACH = 0.6  # radius of that neighbourhood once rods are found, for the joints of scaffold [member lengths]
+SPREADS_PER_THREAD = 400  # fewest samples worth a thread of their own
 SAMPLES_OF_SHEET = 6  # fewest samples in a neighbourhood, rods excluded, that make a sheet
 THIN_VARIANCE = 0.15  # largest variance across a rod, in that along it; half a disc, as at a boundary, has 0.28
 END_REACH = 1.3  # distance from a rod up to which samples may be its ends [member lengths]
@@ -76,7 +79,7 @@ def rod_points(found: Linked, points: int, length: float, supports: np.ndarray |
     if rod.any():  # then joints of a scaffold too, which are rods to all sides
         rod |= line_like(_spreads(found, ~rod, FINE_REACH * length)[0])
     for _ in range(END_ROUNDS if rod.any() else 0):
-        near = ~rod & (_moments(found, rod, END_REACH * length)[2] > 0)
+        near = ~rod & (moments_around(found.mean, found.boxes, rod, END_REACH * length)[2] > 0)
         spreads, off, count = _spreads(found, ~rod, COARSE_REACH * length)
         alone = (count < SAMPLES_OF_SHEET) | line_like(spreads)
         ends = near & (alone | (off > np.maximum(END_OFFSET * length, 2.0 * np.sqrt(spreads[:, 0]))))
@@ -126,7 +129,7 @@ def _long_groups(found: Linked, rod: np.ndarray, known: np.ndarray, length: floa
     label = _groups_of(found, rod)
     long = _sizes(found, label).max(axis=1) >= length
     off = np.zeros(len(rod), np.bool_)
-    off[label[rod & (_moments(found, ~rod, ROD_DISTANCE * length)[2] == 0)]] = True
+    off[label[rod & (moments_around(found.mean, found.boxes, ~rod, ROD_DISTANCE * length)[2] == 0)]] = True
     long &= off
     long[label[known]] = True
     marked: np.ndarray = long[label]
@@ -186,7 +189,9 @@ def _patches(found: Linked, rod: np.ndarray, length: float) -> np.ndarray:
 
 def _sheet_normals(found: Linked, rod: np.ndarray, length: float) -> np.ndarray:
     """Return the normals (S, 3) of the sheet around each sample, without rods."""
-    normals: np.ndarray = np.linalg.eigh(_moments(found, ~rod, COARSE_REACH * length)[0])[1][:, :, 0]
+    normals: np.ndarray = np.linalg.eigh(moments_around(found.mean, found.boxes, ~rod, COARSE_REACH * length)[0])[1][
+        :, :, 0
+    ]
     return normals
 
 
@@ -349,14 +354,16 @@ def line_like(spreads: np.ndarray) -> np.ndarray:
 
 def _spreads(found: Linked, alive: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return, for each sample, the principal variances of the `alive` ones around it, its distance from their plane, and their number."""
-    moments, middle, count = _moments(found, alive, reach)
+    moments, middle, count = moments_around(found.mean, found.boxes, alive, reach)
     spreads, axes = np.linalg.eigh(moments)
     return np.maximum(spreads, 0.0), np.abs(np.einsum("si,si->s", found.mean - middle, axes[:, :, 0])), count
 
 
-def _moments(found: Linked, alive: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the covariance (S, 3, 3), mean (S, 3) and number (S,) of the samples marked `alive` within reach of each."""
-    moments, middle = np.empty((len(found.mean), 3, 3)), np.empty((len(found.mean), 3))
-    count = np.empty(len(found.mean), np.int64)
-    spreads_around(found.mean, found.boxes, alive, reach, moments, middle, count)
+def moments_around(
+    mean: np.ndarray, boxes: SearchBoxes, alive: np.ndarray, reach: float, which: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the covariance (K, 3, 3), mean (K, 3) and number (K,) of the samples marked `alive` within reach of all samples or some."""
+    at = np.arange(len(mean)) if which is None else which
+    moments, middle, count = np.empty((len(at), 3, 3)), np.empty((len(at), 3)), np.empty(len(at), np.int64)
+    run_in_parts(len(at), SPREADS_PER_THREAD, spreads_around, mean, boxes, alive, reach, at, moments, middle, count)
     return moments, middle, count

@@ -167,6 +167,8 @@ def mark_opposite(surface: Surface, boxes: SearchBoxes, reach: float, marks: np.
         for i in range(box_index(boxes, 0, place[0] - far), box_index(boxes, 0, place[0] + far) + 1):
             for j in range(box_index(boxes, 1, place[1] - far), box_index(boxes, 1, place[1] + far) + 1):
                 for k in range(box_index(boxes, 2, place[2] - far), box_index(boxes, 2, place[2] + far) + 1):
+                    if marks[s]:
+                        break
                     t = boxes.first[slot_of(boxes, i, j, k)]
                     while t >= 0 and not marks[s]:
                         d = subtract(row(surface.mean, t), place)
