@@ -187,11 +187,9 @@ class AttemptCourse:
 
     def _drops_parts(self, attempt: Attempt, grid: Grid) -> bool:
         """Whether a grid that passes leaves out a part of the scan that one with less effort may follow."""
-        only_body = attempt.settings.plain_body and not self._settings.plain_body and not attempt.is_trial
-        found = grid.certificate
-        if not only_body or self._settings.effort == LEAST_EFFORT or found is None:
+        if self._settings.plain_body or self._settings.effort == LEAST_EFFORT or attempt.is_trial:
             return False
-        return found.missing > MISSING_ALIKE
+        return attempt.settings.plain_body and grid.certificate is not None and grid.certificate.missing > MISSING_ALIKE
 
     def failed(self, attempt: Attempt, fault: ScanTrussError) -> None:
         """Note that an attempt gives no grid that passes.

@@ -99,7 +99,7 @@ class Judged:
         missed_at = place_of(samples.scan[farthest_followed(found.scan, followed, members)] + samples.origin)
         rough = samples.moved
         feet = feet_on(grid, samples, found, length)
-        offsets, (gaps, bridged), doubtful, aside, beyond, beside, (apart, false), bare, peaks = side_by_side(
+        offsets, (gaps, bridged), doubtful, aside, beyond, beside, (apart, handles), bare, peaks = side_by_side(
             lambda: _offsets(grid, samples, length),
             lambda: bridged_gaps(grid, samples, boundary, length),
             lambda: [] if settings.boundary else doubtful_places(grid, samples, length, boundary.corners, found.scan),
@@ -136,7 +136,7 @@ class Judged:
                 *too_sparse,
                 *too_frayed,
                 *beyond,
-                *false,
+                *handles,
                 *bare,
                 *(each for each in bridged if each.kind == "bridged"),
                 *too_far,

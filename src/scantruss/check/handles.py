@@ -52,25 +52,22 @@ def false_handles(
     tunnels: list[np.ndarray] = []
     count, away = found.handles or 0, samples.scan[points_wanted(samples) & (off > ROUNDED_BY)]
     for ring in rings_around_handles(grid) if count else []:
-        outwards = faces_outwards(grid, ring)
-        known, is_false = (struts, _is_strut) if outwards else (tunnels, _is_closed)
+        known = struts if faces_outwards(grid, ring) else tunnels
         if len(known) == count or _is_beside(ring, known, grid, STRUTS_APART * length):
             continue
-        if is_false(grid.nodes[ring], samples, away, length):
+        places = grid.nodes[ring]
+        is_strut = known is struts and is_around_strut(places, samples, length)
+        is_tunnel = known is tunnels and share_covered(places, away, length) > COVERED_ACROSS
+        if is_strut or is_tunnel:
             known.append(ring)
     joins, opens = "joins parts of the scan that face each other by a strut", "has a tunnel where the scan is closed,"
     return [*_fault("strut", joins, struts, grid), *_fault("tunnel", opens, tunnels, grid)]
 
 
-def _is_strut(ring: np.ndarray, samples: SurfaceSamples, _: np.ndarray, length: float) -> bool:
+def is_around_strut(ring: np.ndarray, samples: SurfaceSamples, length: float) -> bool:
     """Whether a ring (K, 3) is around a strut between sheets of a scan."""
     facing, cosine = sheets_beside(ring, samples, length)
     return (facing > FACE_EACH_OTHER and cosine > ALONG_WAY) or has_sheets_within(ring, samples, length)
-
-
-def _is_closed(ring: np.ndarray, _: SurfaceSamples, away: np.ndarray, length: float) -> bool:
-    """Whether points away from the grid (N, 3) close a tunnel at a ring (K, 3) of it."""
-    return share_covered(ring, away, length) > COVERED_ACROSS
 
 
 def _is_beside(ring: np.ndarray, known: list[np.ndarray], grid: Grid, apart: float) -> bool:

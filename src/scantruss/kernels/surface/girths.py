@@ -161,16 +161,20 @@ def _girth_of(surface: Surface, section: np.ndarray, count: int, a: tuple[float,
 def mark_opposite(surface: Surface, boxes: SearchBoxes, reach: float, marks: np.ndarray, begin: int, end: int) -> None:
     """Mark (S,) the samples from `begin` to `end` - 1 with another within reach [desired lengths] that faces the opposite way."""
     for s in range(begin, end):
-        far = reach * surface.length * surface.field[s]
-        place, normal = row(surface.mean, s), row(surface.normals, s)
-        marks[s] = False
-        for i in range(box_index(boxes, 0, place[0] - far), box_index(boxes, 0, place[0] + far) + 1):
-            for j in range(box_index(boxes, 1, place[1] - far), box_index(boxes, 1, place[1] + far) + 1):
-                for k in range(box_index(boxes, 2, place[2] - far), box_index(boxes, 2, place[2] + far) + 1):
-                    if marks[s]:
-                        break
-                    t = boxes.first[slot_of(boxes, i, j, k)]
-                    while t >= 0 and not marks[s]:
-                        d = subtract(row(surface.mean, t), place)
-                        marks[s] = dot(row(surface.normals, t), normal) < FACING_OPPOSITE and dot(d, d) <= far * far
-                        t = boxes.next[t]
+        marks[s] = _faces_another(surface, boxes, s, reach * surface.length * surface.field[s])
+
+
+@kernel
+def _faces_another(surface: Surface, boxes: SearchBoxes, s: int, far: float) -> bool:
+    """Whether another sample within a distance [scan unit] of one faces the opposite way."""
+    place, normal = row(surface.mean, s), row(surface.normals, s)
+    for i in range(box_index(boxes, 0, place[0] - far), box_index(boxes, 0, place[0] + far) + 1):
+        for j in range(box_index(boxes, 1, place[1] - far), box_index(boxes, 1, place[1] + far) + 1):
+            for k in range(box_index(boxes, 2, place[2] - far), box_index(boxes, 2, place[2] + far) + 1):
+                t = boxes.first[slot_of(boxes, i, j, k)]
+                while t >= 0:
+                    d = subtract(row(surface.mean, t), place)
+                    if dot(row(surface.normals, t), normal) < FACING_OPPOSITE and dot(d, d) <= far * far:
+                        return True
+                    t = boxes.next[t]
+    return False
