@@ -6,6 +6,8 @@ import os
 import signal
 import subprocess
 import sys
+from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -187,22 +189,39 @@ def test_only_the_first_signal_is_an_interruption_and_what_is_ignored_stays_so()
         signal.signal(signal.SIGTERM, kept)
 
 
-def test_a_stop_within_a_callback_that_cannot_raise_says_nothing(capfd: pytest.CaptureFixture[str]) -> None:
+def test_a_stop_where_nothing_can_be_raised_says_nothing_nor_does_what_it_left_half_made(
+    capfd: pytest.CaptureFixture[str],
+) -> None:
     class Last:
-        def __init__(self, error: type[BaseException]) -> None:
-            self.error = error
+        def __init__(self, end: Callable[[], None]) -> None:
+            self.end = end
 
         def __del__(self) -> None:
-            raise self.error
+            self.end()
+
+    class HalfMade:
+        def __init__(self) -> None:
+            signal.raise_signal(signal.SIGTERM)
+            self.handle = 0
+
+        def __del__(self) -> None:
+            del self.handle
+
+    def fail() -> None:
+        raise ValueError
 
     hook = sys.unraisablehook
     sys.unraisablehook = sys.__unraisablehook__
     try:
         with signals_heard():
-            Last(Stopped)
-            assert not capfd.readouterr().err
-            Last(ValueError)
+            Last(fail)
             assert "ValueError" in capfd.readouterr().err
+            Last(lambda: signal.raise_signal(signal.SIGINT))
+            assert stopping.asked() == signal.SIGINT
+        with signals_heard(), suppress(Stopped):
+            HalfMade()
+        assert stopping.asked() == signal.SIGTERM
+        assert not capfd.readouterr().err
         assert sys.unraisablehook is sys.__unraisablehook__
     finally:
         sys.unraisablehook = hook

@@ -60,7 +60,7 @@ def signals_heard() -> Iterator[None]:
     _State.asked, _State.printed, _State.written = None, False, False
     with ExitStack() as stack:
         stack.callback(setattr, sys, "unraisablehook", sys.unraisablehook)
-        sys.unraisablehook = partial(_say_unless_stopped, sys.unraisablehook)
+        sys.unraisablehook = partial(_say_unless_asked, sys.unraisablehook)
         for number in SIGNAL_STATUS:
             if callable(kept := signal.getsignal(number)) or kept == signal.SIG_DFL:
                 with suppress(ValueError):  # only the main thread may
@@ -73,9 +73,13 @@ def signals_heard() -> Iterator[None]:
                 clean_up()
 
 
-def _say_unless_stopped(say: Callable[[sys.UnraisableHookArgs], object], lost: sys.UnraisableHookArgs) -> None:
-    """Say what was lost in a callback that cannot raise, but for `Stopped`: then the watch ends the process."""
-    if not issubclass(lost.exc_type, Stopped):
+def _say_unless_asked(say: Callable[[sys.UnraisableHookArgs], object], lost: sys.UnraisableHookArgs) -> None:
+    """Say what went wrong where nothing can be raised, but not once the process was asked to end.
+
+    Then it is `Stopped` itself, and the watch ends the process, or an object that the stop left half-made and that cannot be
+    taken down, as LLVM's.
+    """
+    if _State.asked is None:
         say(lost)
 
 
