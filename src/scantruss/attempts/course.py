@@ -29,7 +29,17 @@ from .looks import (
 )
 from .lost_ridges import lost_ridges
 from .moved_corners import with_moved_corners
-from .table import AS_ASKED, SECOND_LAYOUT, Attempt, attempts, judging_outliers, layouts_of
+from .table import (
+    AS_ASKED,
+    PLAIN_BODY,
+    PLAIN_NEAR_FAULTS,
+    SECOND_LAYOUT,
+    TIMES_OF_PLAINER,
+    Attempt,
+    attempts,
+    judging_outliers,
+    layouts_of,
+)
 
 if TYPE_CHECKING:
     from ..grid.grid import Grid
@@ -60,6 +70,8 @@ class AttemptCourse:
     What follows is put in next, each by one law:
 
     - `RIDGES_GIVEN_UP`: an attempt fails near ridges; each gives up one place more at least, of `FAULTS_WITHOUT_RIDGES`.
+    - `PLAIN_NEAR_FAULTS`: before the plain body is tried, the first attempt again without the thin limbs and slits near its faults; then
+      without those near the faults of that too, `TIMES_OF_PLAINER` at most.
     - `WITHOUT_RODS`: a grid passes but runs along rods; once, as the last attempt. That with fewer warnings is taken, or that without
       them where it spans fewer gaps or they are columns of a shell: a grid around some of them is no part of it.
     - outliers judged: a grid fails as points too far apart lie on much of the surface; the attempt again and all after it with these
@@ -102,6 +114,7 @@ class AttemptCourse:
         self._follows: Attempt | None = None  # what is put in next
         self._row_begun: Attempt | None = None  # the attempt of the table that those put in follow
         self._first_fault: FrontError | None = None  # of that attempt
+        self._times_plainer = 0  # times that limbs and slits near faults were left aside
         self._fails_by_front = True  # whether that attempt and all that followed it do
         self._passed: Grid | None = None
         self._around_columns = False  # whether that is a grid around columns
@@ -131,12 +144,30 @@ class AttemptCourse:
         """Return the next attempt of the list that is worth making."""
         # ends: the list does
         while self._limit.any_left() and (attempt := next(filter(self._limit.allows, self._tried), None)) is not None:
+            if (
+                attempt.row == PLAIN_BODY
+                and self._times_plainer == 0
+                and (near := self._with_its_limbs(attempt)) is not None
+            ):
+                self._tried, attempt = chain([attempt], self._tried), near
             self._row_begun, self._first_fault, self._fails_by_front = attempt, None, True
             if (fault := self._limit.known_fault(attempt)) is None:
                 return attempt
             self._limit.begin()
             self._note(attempt, fault)
         return None
+
+    def _with_its_limbs(self, plain: Attempt) -> Attempt | None:
+        """Return the attempt at a plain body with all of its limbs and slits but those near which the first attempt failed."""
+        kept = plain.settings.replace(plain_body=False, effort=self._settings.effort)
+        return self._plainer(replace(plain, settings=kept), self._limit.first_fault)
+
+    def _plainer(self, attempt: Attempt, fault: ScanTrussError | None) -> Attempt | None:
+        """Return an attempt without the limbs and slits near its fault; None where none is near, or that was done often enough."""
+        if not isinstance(fault, FrontError) or self._times_plainer == TIMES_OF_PLAINER:
+            return None
+        self._times_plainer += 1
+        return attempt.plainer(fault, self._cloud)
 
     def _tries_least_effort(self) -> bool:
         """Whether all attempts are made once more; where they are, what refuses the grid is noted."""
@@ -187,9 +218,9 @@ class AttemptCourse:
 
     def _drops_parts(self, attempt: Attempt, grid: Grid) -> bool:
         """Whether a grid that passes leaves out a part of the scan that one with less effort may follow."""
-        if self._settings.plain_body or self._settings.effort == LEAST_EFFORT or attempt.is_trial:
+        if self._settings.is_plain or self._settings.effort == LEAST_EFFORT or attempt.is_trial:
             return False
-        return attempt.settings.plain_body and grid.certificate is not None and grid.certificate.missing > MISSING_ALIKE
+        return attempt.settings.is_plain and grid.certificate is not None and grid.certificate.missing > MISSING_ALIKE
 
     def failed(self, attempt: Attempt, fault: ScanTrussError) -> None:
         """Note that an attempt gives no grid that passes.
@@ -213,10 +244,12 @@ class AttemptCourse:
         if isinstance(fault, FrontError):
             self._limit.end(fault)
             self._first_fault = self._first_fault or fault
-            hopeless = loses_limbs(attempt.settings, fault) or not self._limit.any_left()
-            later = None if hopeless else attempt.after(fault, self._cloud)
-            if later is not None:
+            hopeless = loses_limbs(attempt.settings, fault)
+            if attempt.row == PLAIN_NEAR_FAULTS:
+                self._follows = None if hopeless else self._plainer(attempt, fault)
+            elif not hopeless and self._limit.any_left() and (later := attempt.after(fault, self._cloud)) is not None:
                 self._follows = replace(later, row=RIDGES_GIVEN_UP)
+            if self._follows is not None:
                 return
             fault = self._first_fault
         if self._passed is None and self._row_begun is not None:

@@ -23,7 +23,16 @@ MOST_FAR_OF_BODY = 1
 LIMBS_BY_FRONT = 1.1
 FAULTS_OF_FRONTS = {"manifold", "orientable", "pieces", "loops"}  # kinds of faults that no search changes
 # settings by which limbs are cut off, and what may be left of them, beside how far the samples are apart
-CUTS_BY = ("limb_girth", "keep_rods", "judge_outliers", "smooth_scale", "thin_walls", "sharp_edges", "plain_body")
+CUTS_BY = (
+    "limb_girth",
+    "keep_rods",
+    "judge_outliers",
+    "smooth_scale",
+    "thin_walls",
+    "sharp_edges",
+    "plain_body",
+    "plain_at",
+)
 
 
 def only_leaves_out(fault: ScanTrussError) -> TypeGuard[CertificateError]:
@@ -110,6 +119,9 @@ class AttemptLimit:
         self._failing_by_front: list[tuple[Attempt, ScanTrussError]] = []
         self._known_to_fail = [] if earlier is None else earlier._failing_by_front
         self.runs = 0  #: grids that were made
+        self.first_fault: ScanTrussError | None = (
+            None  #: what has come of the first attempt, where it gave no grid that passes
+        )
         self._looks_one_sided = self._joins_sheets = False
 
     def allow(self, more: int, stops_early: bool = False) -> None:
@@ -179,6 +191,7 @@ class AttemptLimit:
 
     def note(self, attempt: Attempt, fault: ScanTrussError) -> None:
         """Note what has come of an attempt."""
+        self.first_fault = self.first_fault or fault
         self._looks_one_sided |= isinstance(fault, OneSidedError)
         if loses_limbs(attempt.settings, fault):
             self._losing_limbs.append(attempt.settings)

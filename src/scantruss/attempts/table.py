@@ -27,7 +27,8 @@ if TYPE_CHECKING:
     from ..settings import Settings
     from ..surface.samples import SurfaceSamples
 
-# names of rows
+# names of rows, and of what is put in before one
+PLAIN_NEAR_FAULTS = "plain body near the faults"
 AS_ASKED, WITHOUT_ROWS, ROWS_TURNED, PLAIN_BODY = "as asked", "front without rows", "rows turned", "plain body"
 # lengths of the fronts without rows, in desired lengths, tried in turn where no other passes
 FRONT_LENGTHS = (1.0, 0.97, 1.04)
@@ -39,6 +40,7 @@ SMOOTHING_SCALES = (
     1.0,
 )  # scales over which a rough scan is smoothed where no grid passes without [member lengths]
 THINNER_GIRTHS = (0.8, 0.0)  # girths below which limbs are cut off that are tried instead, in that of the settings
+TIMES_OF_PLAINER = 6  # times that thin limbs and slits near further faults are left aside
 FAULTS_WITHOUT_RIDGES = 6  # places at which ridges are given up, before they all are
 
 Starts = tuple[FieldStart, ...] | None  # how fronts are laid out; None: as the effort of the settings allows
@@ -68,6 +70,20 @@ class Attempt:
         new = tuple(dict.fromkeys(place for place in places_of_fault(fault) if place not in self.faults))
         later = replace(self, faults=self.faults + new)
         return later if new and later.ridge_points(cloud) < followed else None
+
+    def plainer(self, fault: FrontError, cloud: PointCloud) -> Attempt | None:
+        """The same attempt without the limbs and slits near which it failed too.
+
+        Where none is near it is laid out otherwise, once; None where it fails then, or none was ever near.
+        """
+        known = tuple(self.settings.plain_at)
+        new = tuple(dict.fromkeys(place for place in places_of_fault(fault) if place not in known))
+        later = replace(self, settings=self.settings.replace(plain_at=known + new), row=PLAIN_NEAR_FAULTS)
+        before, after = (sample_surface(cloud, each.settings).judged for each in (self, later))
+        if not np.array_equal(before, after):
+            return later
+        is_first = self.starts is not None or self.row != PLAIN_NEAR_FAULTS
+        return None if is_first else replace(self, starts=layouts_of(self.settings)[SECOND_LAYOUT][0])
 
     def after_poor(self, places: Sequence[Place], cloud: PointCloud) -> Attempt | None:
         """The same attempt without the wide fold beside each of some poor places [scan unit]; None where it can be no better.

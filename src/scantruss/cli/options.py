@@ -291,7 +291,7 @@ def _add_options(group: argparse._ArgumentGroup, specs: Iterable[Field[Any]]) ->
     for spec in specs:
         choices = spec.metadata["choices"]
         options: dict[str, Any] = {"dest": spec.name, "default": argparse.SUPPRESS, "help": describe(spec)}
-        if spec.name in ("fixed", "fill_at", "no_ridge_at"):
+        if spec.name in ("fixed", "plain_at", "fill_at", "no_ridge_at"):
             options |= {"action": "append", "type": position, "metavar": "X,Y,Z"}
             options["help"] += "; repeatable"
         elif spec.name == "rows_along":

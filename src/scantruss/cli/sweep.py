@@ -59,7 +59,7 @@ def sweep_parser() -> Parser:
 MOST_RISE = 10.0  #: greatest height over that of the grid
 # one value only
 ONE_AT_LEAST = (
-    "memory", "workers", "fixed", "fixed_lines", "fill_at", "no_ridge_at", "rows_along", "unit", "z_unit", "returns",
+    "memory", "workers", "fixed", "fixed_lines", "plain_at", "fill_at", "no_ridge_at", "rows_along", "unit", "z_unit", "returns",
     "confidence",
     "thin_spacing",
 )  # fmt: skip

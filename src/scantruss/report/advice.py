@@ -6,7 +6,7 @@ How much is tried is counted in grids and in points, not in seconds: the same sc
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -187,14 +187,17 @@ class Advice:
             most_lost = max(least + ladder.LOST_ALIKE, ladder.LOST_ALIKE_SHARE * least)
             length = self._losing_less(next(length for length, lost in both.items() if lost <= most_lost))
             return self._following_more(self._found[length])
-        if not self.passes:
+        is_large = (
+            ladder.LEAST_TRIED * self._cost(self._usual) >= ladder.POINTS_LOOKED_AT
+        )  # so that fewer grids are made
+        if not (self.passes or is_large):
             self._try_last()
-        if not self.passes:
+        if not (self.passes or is_large):
             self._try_beside()
         passing = [trial.length for trial in self.tried if trial.passed]
         if passing:
-            left = ladder.MOST_TRIED + ladder.TRIED_AROUND - self._spent
-            self._count_at(self.next_below(passing[0]), min(max(left, ladder.A_FEW), 3 * ladder.A_FEW))
+            left = max(ladder.MOST_IN_ALL - self._spent, ladder.A_FEW)
+            self._count_at(self.next_below(passing[0]), min(left, 3 * ladder.A_FEW))
             if (shorter := shorter_with_next_above(self, passing[0])) is not None:
                 return shorter
         followed = [one for one in passing if any(one < other <= ladder.NEARLY_NEXT * one for other in passing)]
@@ -223,38 +226,36 @@ class Advice:
         return length_that_follows(self, trial)
 
     def _try_last(self) -> None:
-        """Try more lengths until one passes, with the grids of the table; not of a scan so large that fewer grids are made.
+        """Try more lengths until one passes, with the grids of the table.
 
-        They are longer than the usual one, as columns are then seen for what they are; where limbs are too thin, one a bit shorter first.
+        They are longer than the usual one, as columns are then seen for what they are; where limbs are too thin, some shorter first.
         """
-        if ladder.LEAST_TRIED * self._cost(self._usual) >= ladder.POINTS_LOOKED_AT:
-            return
-        self._count_at(self._usual, ladder.TRIED_AROUND)
         self._has_table_grids = False
-        for share, most in ladder.LAST_WITH_LIMBS if self._loses_limbs() else ladder.LAST_LENGTHS:
-            length = min(ladder.two_digits(share * self._usual), length_range(self._cloud)[1])
-            trial = self.try_length(length, most)
-            if trial is not None and trial.passed:
-                return
+        steps = ladder.LAST_WITH_LIMBS if self._loses_limbs() else ladder.LAST_LENGTHS
+        self._count_at(self._usual, ladder.LAST_PER_LENGTH * len(steps))
+        longest = length_range(self._cloud)[1]
+        self._try_each((min(ladder.two_digits(share * self._usual), longest), most) for share, most in steps)
 
     def _try_beside(self) -> None:
         """Try lengths until one passes, where grids and hope are left: that which came nearest, then those beside the usual one.
 
         Steps as of the table may miss them.
         """
-        left = ladder.MOST_TRIED + ladder.TRIED_AROUND - self._spent
-        is_large = ladder.LEAST_TRIED * self._cost(self._usual) >= ladder.POINTS_LOOKED_AT
+        left = ladder.MOST_IN_ALL - self._spent
         usual = self._begun.get(self._usual)
-        if is_large or left < ladder.FIRST_TWO or (usual is not None and usual[2].all_hopeless):
+        if left < ladder.FIRST_TWO or (usual is not None and usual[2].all_hopeless):
             return
         steps = [(ladder.two_digits(share * self._usual), ladder.FIRST_TWO) for share in ladder.BESIDE_USUAL]
         nearest = next((trial for trial in self.tried if trial.paused and trial.has_one_fault), None)
         if nearest is not None:
             steps.insert(0, (nearest.length, nearest.grids + ladder.FIRST_TWO))
         self._count_at(self._usual, min(left, ladder.FIRST_TWO * len(steps)))
+        self._try_each(steps)
+
+    def _try_each(self, steps: Iterable[tuple[float, int]]) -> None:
+        """Try lengths, with so many grids of each, until one passes."""
         for length, most in steps:
-            trial = self.try_length(length, most)
-            if trial is not None and trial.passed:
+            if (trial := self.try_length(length, most)) is not None and trial.passed:
                 return
 
     def _ladder(self) -> Iterator[tuple[float, int]]:

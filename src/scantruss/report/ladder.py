@@ -28,7 +28,8 @@ SHORTER_FIRST = (
 )  # fmt: skip
 #: lengths to try where none has passed, and where limbs are too thin besides, so that the third grid is that of the body without them
 LAST_LENGTHS = ((1.4, FIRST_TWO), (2.0, FIRST_TWO), (2.8, FIRST_TWO))
-LAST_WITH_LIMBS = ((0.85, 3), (2.0, FIRST_TWO))
+LAST_WITH_LIMBS = ((0.85, 3), (0.6, 3), (2.0, FIRST_TWO))
+LAST_PER_LENGTH = 3.0  # grids that are made for each of them, counted by their cost
 NEARLY_NEXT = 1.45  # ratio of lengths that pass up to which the longer one stands for the next to the shorter
 LINES_OF_A_SCANNER = 5  # fewest lines of points that may be those of a scanner
 BETWEEN = 0.87  # ratio of a length between two, of which the longer passes, to that
@@ -50,6 +51,7 @@ MOST_TRIED = 20.0  # grids that are made for a suggestion, or to find a length n
 POINTS_LOOKED_AT = 2_000_000  # points that are looked at for that
 LEAST_TRIED = 5.0  # grids that are made for that even where the scan has more points
 TRIED_AROUND = 6.0  # grids that are made besides for the lengths of the table, one each
+MOST_IN_ALL = MOST_TRIED + TRIED_AROUND
 TRIED_USUAL = 4.0  # grids that are made at the usual length where no length nearby passes
 FAR_TOO_SHORT = 0.2  # share of the shortest possible length below which the usual one is looked at alone: that length is in another unit
 POINTS_PER_MEMBER = 9  # points that cost as much as a member of the grid

@@ -224,6 +224,11 @@ class SurfaceSettings(_Checked):
         "take limbs thinner than 0.9 members off the body that the scan encloses, and fill slits narrower than 0.6 members;"
         " tried automatically if no grid passes",
     )
+    plain_at: Sequence[Sequence[float]] = _setting(
+        (),
+        "the same, but only of limbs and slits within three members of each of these places; tried automatically where a grid fails",
+        unit="scan unit",
+    )
 
 
 @dataclass(frozen=True, kw_only=True)

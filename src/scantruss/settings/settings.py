@@ -79,7 +79,7 @@ class Settings(
         if self.planar and self.cells == "triangle":
             raise InputError("planar needs cells quad or hexagon; triangles always are")
         object.__setattr__(self, "fixed", check_positions(self.fixed))
-        for name in ("fill_at", "no_ridge_at"):
+        for name in ("plain_at", "fill_at", "no_ridge_at"):
             object.__setattr__(self, name, check_places(name, getattr(self, name)))
         object.__setattr__(self, "fixed_lines", tuple(check_line(line) for line in self.fixed_lines))
         object.__setattr__(self, "symmetry", check_symmetry(self.symmetry))
@@ -118,6 +118,11 @@ class Settings(
                 raise InputError(
                     f"{name} acts while a scan file is read, and an array is taken whole; cut the array or use grid_from_scan"
                 )
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether thin limbs are taken off the body that the scan encloses, everywhere or near some places."""
+        return self.plain_body or len(self.plain_at) > 0
 
     @property
     def closed_boundary_length(self) -> float:

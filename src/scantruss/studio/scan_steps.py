@@ -24,7 +24,8 @@ from .steps import Steps
 from .support_places import for_new_scan
 
 PLACED_SETTINGS = (
-    "crop", "length_field", "rows_along", "boundary", "fill_at", "fixed", "fixed_lines", "line_names", "symmetry", "no_ridge_at",
+    "crop", "length_field", "rows_along", "boundary", "plain_at", "fill_at", "fixed", "fixed_lines", "line_names", "symmetry",
+    "no_ridge_at",
 )  # fmt: skip  #: those that name places or directions
 LARGEST_UPLOAD = 500_000_000  #: of a scan that comes through the page [bytes]
 TOO_LARGE = f"a scan of more than {LARGEST_UPLOAD:,} bytes; name it on the command line: scantruss studio SCAN"

@@ -47,6 +47,7 @@ NEAR_GAP = 0.7  # distance of samples of one boundary [member lengths]
 MOST_OPEN = 0.12  # area within the boundaries of a scan that still encloses a body [area of the scan]
 FEWEST_OF_BOUNDARY = 8  # samples of a boundary that is walled off
 MOST_TAKEN_OFF = 0.4  # share of the points that may be taken off; of more, the scan encloses no body
+NEAR_PLACES = 3.0  # distance from a place up to which a limb or slit is near it [member lengths]
 BODIES_KEPT = 4  # bodies opened last that are kept, as several looks at a scan ask for the same; two bytes a point
 
 
@@ -72,12 +73,14 @@ class _Lattice(NamedTuple):
         return voxels
 
 
-# by the digest of the points, their length and spacing; the one asked for last is the last
-_OPENED: dict[tuple[bytes, float, float], OpenedBody | None] = {}
+Places = tuple[tuple[float, ...], ...]
+
+# by the digest of the points, their length and spacing and the places; the one asked for last is the last
+_OPENED: dict[tuple[bytes, float, float, Places], OpenedBody | None] = {}
 
 
 def opened_body(
-    points: np.ndarray, length: float, spacing: float, given: GivenNormals | None = None
+    points: np.ndarray, length: float, spacing: float, given: GivenNormals | None = None, places: Places = ()
 ) -> OpenedBody | None:
     """Return the body that points (N, 3) enclose, opened and closed; None where they enclose none, or there is nothing to take off or fill.
 
@@ -89,18 +92,22 @@ def opened_body(
         Typical distance between neighbouring points [scan unit].
     given : GivenNormals, optional
         Normals that came with the scan.
+    places : tuple of (x, y, z), optional
+        Where limbs are taken off and slits filled, in the frame of the points; all are where there is none.
     """
     if given is not None:
-        return _opened(points, length, spacing, given)
-    asked = (sha256(points.tobytes()).digest(), length, spacing)
-    opened = _OPENED.pop(asked) if asked in _OPENED else _opened(points, length, spacing, None)
+        return _opened(points, length, spacing, given, places)
+    asked = (sha256(points.tobytes()).digest(), length, spacing, places)
+    opened = _OPENED.pop(asked) if asked in _OPENED else _opened(points, length, spacing, None, places)
     _OPENED[asked] = opened
     for oldest in list(_OPENED)[:-BODIES_KEPT]:
         del _OPENED[oldest]
     return opened
 
 
-def _opened(points: np.ndarray, length: float, spacing: float, given: GivenNormals | None) -> OpenedBody | None:
+def _opened(
+    points: np.ndarray, length: float, spacing: float, given: GivenNormals | None, places: Places
+) -> OpenedBody | None:
     """Return the body that points (N, 3) enclose, opened and closed, as `opened_body`."""
     found = link_samples(points, max(WALL_SAMPLES * length, 0.25 * spacing), length, spacing, given)
     if len(found.mean) <= NEIGHBORS_AT_BOUNDARY:
@@ -111,11 +118,12 @@ def _opened(points: np.ndarray, length: float, spacing: float, given: GivenNorma
     wall, at_gaps = np.zeros(lattice.shape, np.bool_), _at_gaps(found)
     for triangles in chain(_fans(found, length), _discs(found, at_gaps, length)):
         _mark(wall, triangles, lattice)
-    opened = _open_and_close(points, _enclosed(wall), lattice, length)
+    where = NearPlaces(np.reshape(places, (-1, 3)), NEAR_PLACES * length)
+    opened = _open_and_close(points, _enclosed(wall), lattice, length, where)
     if opened is None and (caps := _caps(found, at_gaps, length, float(wall.sum()) * lattice.size**2)):
         for triangles in caps:
             _mark(wall, triangles, lattice)
-        opened = _open_and_close(points, _enclosed(wall), lattice, length)
+        opened = _open_and_close(points, _enclosed(wall), lattice, length, where)
     return opened
 
 
@@ -259,6 +267,27 @@ def _beyond_ball(voxels: Voxels, radius: float, deep: float, lattice: _Lattice) 
     return near
 
 
+class NearPlaces(NamedTuple):
+    """Where limbs are taken off and slits filled."""
+
+    places: np.ndarray  #: (K, 3) [scan unit]; everywhere where there is none
+    reach: float  #: [scan unit]
+
+    def of(self, voxels: Voxels, lattice: _Lattice) -> Voxels:
+        """Return the parts of some voxels (X, Y, Z) that come near a place."""
+        from scipy import ndimage
+        from scipy.spatial import cKDTree
+
+        if not len(self.places) or not voxels.any():
+            return voxels
+        part, count = ndimage.label(voxels, np.ones((3, 3, 3), np.bool_))
+        at = np.argwhere(voxels)
+        away = cKDTree(lattice.of(self.places)).query(at, distance_upper_bound=self.reach / lattice.size)[0]
+        kept = np.zeros(count + 1, np.bool_)
+        kept[part[tuple(at[np.isfinite(away)].T)]] = True
+        return np.asarray(kept[part])
+
+
 def _without_walls(limbs: Voxels, body: Voxels) -> Voxels:
     """Return which parts of limbs (X, Y, Z) are none that wall off a hollow or close a hole: without those a body would have a tunnel."""
     from scipy import ndimage
@@ -306,16 +335,19 @@ def _islands(body: Voxels, before: Voxels) -> Voxels:
     return islands
 
 
-def _open_and_close(points: np.ndarray, body: Voxels, lattice: _Lattice, length: float) -> OpenedBody | None:
+def _open_and_close(
+    points: np.ndarray, body: Voxels, lattice: _Lattice, length: float, where: NearPlaces
+) -> OpenedBody | None:
     """Return what becomes of points (N, 3) around a body; None where it is all thinner than a limb, loses too much or nothing changes."""
     from scipy import ndimage
     from scipy.spatial import cKDTree
 
     if not (_distance(~body, lattice, LIMB_RADIUS * length) >= LIMB_RADIUS * length).any():  # pockets of an open sheet
         return None
-    limbs = _without_walls(_beyond_ball(body, LIMB_RADIUS * length, DEPTH_OF_LIMBS * length, lattice), body)
+    thin = where.of(_beyond_ball(body, LIMB_RADIUS * length, DEPTH_OF_LIMBS * length, lattice), lattice)
+    limbs = _without_walls(thin, body)
     body = body & ~limbs
-    slits = _beyond_ball(~body, SLIT_RADIUS * length, DEPTH_OF_LIMBS * length, lattice)
+    slits = where.of(_beyond_ball(~body, SLIT_RADIUS * length, DEPTH_OF_LIMBS * length, lattice), lattice)
     islands = _islands(body | slits, body | limbs)
     limbs |= islands
     body = (body | slits) & ~islands
@@ -324,8 +356,10 @@ def _open_and_close(points: np.ndarray, body: Voxels, lattice: _Lattice, length:
     depth -= 0.5 * lattice.size * np.sign(depth)
     at = lattice.of(points).T
     own = ndimage.map_coordinates(depth, at, order=1)
-    slit = own > OFF_BODY * lattice.size
-    slits[tuple(np.rint(at[:, slit]).astype(int))] = True  # those so narrow that the walls filled them
+    inside, voxel = own > OFF_BODY * lattice.size, tuple(np.rint(at).astype(int))
+    slits[tuple(axis[inside] for axis in voxel)] = True  # those so narrow that the walls filled them
+    slits = where.of(slits, lattice)
+    slit = inside & slits[voxel]
     changed = _distance(limbs | slits, lattice, max(length, reach))
     near = ndimage.map_coordinates(np.minimum(changed, length), at, order=1) < 2.0 * lattice.size
     limb = near & (own < -OFF_BODY * lattice.size)

@@ -56,6 +56,9 @@ class Asked(NamedTuple):
     smooth_scale: float  #: size of what is smoothed away [`length`]
     sharp_edges: bool  #: whether samples on sharp edges of bodies face away from them
     plain_body: bool  #: whether thin limbs are taken off the body that the scan encloses, and slits filled
+    plain_at: tuple[
+        tuple[float, ...], ...
+    ]  #: places (x, y, z) from the origin near which alone they are, where there are any
     thin_walls: bool  #: whether the sides of thin walls are distinguished first
 
     @classmethod
@@ -82,8 +85,14 @@ class Asked(NamedTuple):
             scale,
             settings.sharp_edges,
             settings.plain_body,
+            tuple(tuple((np.array(place, float) - origin).tolist()) for place in settings.plain_at),
             settings.thin_walls,
         )
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether limbs are taken off the body that the scan encloses, anywhere."""
+        return self.plain_body or bool(self.plain_at)
 
 
 class ChosenSamples(NamedTuple):
@@ -113,7 +122,7 @@ def _smooth_samples(
     """Return larger samples if no size is set and the scan is dense, smooth and without outliers, else None."""
     length, radius = asked.length, SMOOTH_SAMPLE_SPACING * asked.length
     exact = (
-        asked.box_size is not None or asked.judge_always or asked.smooth_scale or asked.sharp_edges or asked.plain_body
+        asked.box_size is not None or asked.judge_always or asked.smooth_scale or asked.sharp_edges or asked.is_plain
     )
     if exact or spacing > SPARSE_SPACING * length:
         return None

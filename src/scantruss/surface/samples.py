@@ -335,9 +335,9 @@ def _prepare(
         left = np.ascontiguousarray(scan[judged == KEPT])
         chosen = usual_samples(left, bounds_of(left), spacing, asked._replace(outlier_distance=0.0), given, thinned)
     added, again = np.zeros((0, 3)), asked._replace(outlier_distance=0.0)
-    if asked.plain_body and thinned:
+    if asked.is_plain and thinned:
         kept = np.flatnonzero(judged == KEPT)
-        opened = opened_body(scan[kept], length, spacing, given)
+        opened = opened_body(scan[kept], length, spacing, given, () if asked.plain_body else asked.plain_at)
         if opened is not None:
             judged[kept[opened.limb]], judged[kept[opened.slit]], added = LIMB, SLIT, opened.added
             left = np.concatenate([scan[judged == KEPT], added])
