@@ -27,8 +27,10 @@ from scantruss.attempts.limit import MOST_RUNS
 from scantruss.attempts.table import (
     AS_ASKED,
     PLAIN_BODY,
+    PLAIN_NEAR_FAULTS,
     ROWS_OF_TRIALS,
     ROWS_TRIED,
+    TIMES_OF_PLAINER,
     TURNED_ROWS,
     Attempt,
     AttemptRow,
@@ -327,6 +329,55 @@ def test_a_plain_body_that_drops_parts_is_followed_by_the_least_effort_and_the_b
     assert [each.row for each in made] == [AS_ASKED, PLAIN_BODY, *[WITH_LEAST_EFFORT] * 2 * drops]
     assert all(changed_between(settings, each.settings) == {"effort"} for each in made[2:])
     assert course.outcome() is (asked if is_better and drops else body)
+
+
+@pytest.mark.parametrize("turns", [1, 3, TIMES_OF_PLAINER + 2])
+def test_before_the_plain_body_limbs_and_slits_near_faults_are_left_aside(
+    turns: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen: list[str] = []
+
+    def plainer(self: Attempt, fault: FrontError, cloud: st.PointCloud) -> Attempt | None:
+        seen.append(str(fault))
+        places = (*self.settings.plain_at, (float(len(seen)), 0.0, 0.0))
+        if len(places) > turns:
+            return None
+        return replace(self, settings=self.settings.replace(plain_at=places), row=PLAIN_NEAR_FAULTS)
+
+    monkeypatch.setattr(Attempt, "plainer", plainer)
+    monkeypatch.setattr(Attempt, "after", lambda *_: None)
+    cloud, asked = st.PointCloud.from_array(CLOUDS["cap"][0]), st.Settings(length=1.0, effort="quick")
+    rows: list[tuple[str, dict[str, Any]]] = [
+        (AS_ASKED, {}),
+        ("sharp edges", {"sharp_edges": True}),
+        (PLAIN_BODY, {"plain_body": True, "effort": "normal"}),
+    ]
+    tried = [Attempt(asked.replace(**changes), is_trial=True, row=row) for row, changes in rows]
+    course = AttemptCourse(cloud, asked, tried)
+    made = driven(course, {})
+    near = made[2:-1]
+    assert [each.row for each in made] == [AS_ASKED, "sharp edges", *[PLAIN_NEAR_FAULTS] * len(near), PLAIN_BODY]
+    assert len(near) == min(turns, TIMES_OF_PLAINER)
+    assert all(each.is_trial and changed_between(asked, each.settings) == {"plain_at"} for each in near)
+    assert [len(each.settings.plain_at) for each in near] == list(range(1, len(near) + 1))
+    assert seen[0] == "fault 1" and seen[1:3] == ["fault 3", "fault 4"][: len(seen) - 1]  # of the first, then its own
+
+
+def test_what_is_near_a_fault_is_left_aside_once_and_then_the_front_is_laid_out_otherwise() -> None:
+    turn = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
+    along = np.linspace(4.0, 7.0, 40)
+    tube = np.stack([np.repeat(along, 24), 0.25 * np.tile(np.cos(turn), 40), 0.25 * np.tile(np.sin(turn), 40)], axis=1)
+    directions = np.random.default_rng(0).normal(size=(20_000, 3))
+    body = 4.0 * directions / np.linalg.norm(directions, axis=1)[:, None]
+    cloud = st.PointCloud.from_array(np.concatenate([body, tube]))
+    first = Attempt(st.Settings(length=1.0, limb_girth=0.0))
+    near, far = FrontError("a fault", where=(6.5, 0.0, 0.0)), FrontError("another", where=(-4.0, 0.0, 0.0))
+    assert first.plainer(far, cloud) is None and first.plainer(FrontError("nowhere"), cloud) is None
+    plain = first.plainer(near, cloud)
+    assert plain is not None and plain.settings.plain_at == ((6.5, 0.0, 0.0),) and plain.starts is None
+    other = plain.plainer(far, cloud)
+    assert other is not None and other.settings == plain.settings and other.starts is not None
+    assert other.plainer(near, cloud) is None
 
 
 def knotted_tube(sides: int = 12, count: int = 30_000) -> np.ndarray:

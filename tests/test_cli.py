@@ -521,6 +521,7 @@ def test_a_drawing_of_a_failed_grid_is_not_used_unless_told(
         ("--search-range 2", "--search-range: for --method paper"),
         ("--method paper --ridge-angle 20", "--ridge-angle: for the default method; --method paper does without"),
         ("--no-ridge-at 1,2,3", "no ridge passes 1, 2, 3, so --no-ridge-at changes nothing there"),
+        ("--plain-at 1,2,3", "no thin limb or slit is near 1, 2, 3, so --plain-at changes nothing there"),
         ("--method paper --search-range 2", ""),
     ],
 )

@@ -11,6 +11,7 @@ from scipy import ndimage
 import scantruss as st
 from scantruss.surface import body
 from scantruss.surface.body import BODIES_KEPT, LIMB_RADIUS, SLIT_RADIUS, _distance, _euler, _Lattice, opened_body
+from scantruss.surface.chosen_samples import KEPT, LIMB
 from scantruss.surface.samples import sample_surface
 
 LENGTH, RADIUS, SPACING = 1.0, 4.0, 0.1
@@ -82,6 +83,24 @@ def test_what_hung_on_a_limb_leaves_with_it() -> None:
     opened = opened_body(scan, LENGTH, SPACING)
     assert opened is not None and opened.limb[np.linalg.norm(scan, axis=1) > RADIUS + 0.8].all()
     assert (np.linalg.norm(opened.added - [RADIUS, 0.0, 0.0], axis=1) < 1.0).all()
+
+
+def test_limbs_are_taken_off_near_places_alone_where_there_are_any() -> None:
+    limb = outside(rod(0.25, straight(3.0)))
+    scan = np.concatenate([ball(), limb, limb * [-1.0, -1.0, 1.0]])
+    ahead, behind = scan[:, 0] > RADIUS + 0.8, scan[:, 0] < -RADIUS - 0.8
+    tip, other = (RADIUS + 3.0, 0.0, 0.0), (-RADIUS - 1.5, 0.0, 0.0)
+    everywhere = opened_body(scan, LENGTH, SPACING)
+    assert everywhere is not None and everywhere.limb[ahead | behind].all()
+    for place, taken, kept in ((tip, ahead, behind), (other, behind, ahead)):
+        opened = opened_body(scan, LENGTH, SPACING, None, (place,))
+        assert opened is not None and opened.limb[taken].all() and not opened.limb[kept].any()
+        assert (opened.limb <= everywhere.limb).all()
+        assert (opened.added[:, 0] * place[0] > 0.0).all()
+    both = opened_body(scan, LENGTH, SPACING, None, (tip, other))
+    assert both is not None and (both.limb == everywhere.limb).all()
+    assert {tuple(place) for place in both.added} <= {tuple(place) for place in everywhere.added}
+    assert opened_body(scan, LENGTH, SPACING, None, ((0.0, 0.0, RADIUS),)) is None
 
 
 @pytest.mark.parametrize("radius", [0.7, 1.0])
@@ -213,3 +232,27 @@ def test_a_body_with_a_thin_tail_beside_it_gets_a_grid_without_the_tail() -> Non
     assert (grid.topology.boundary_loops, grid.topology.euler) == (0, 2)
     samples = sample_surface(st.PointCloud.from_array(tailed()), settings.replace(plain_body=True))
     assert samples.measured < len(samples.surface.mean)
+
+
+@compiled_only
+def test_a_limb_near_a_place_is_left_out_and_said_and_one_elsewhere_is_followed() -> None:
+    limb = outside(rod(0.55, straight(3.0)))
+    scan = np.concatenate([tailed(), limb * [-1.0, 1.0, 1.0]])  # that is wide enough for members
+    at = RADIUS * np.array([np.cos(2.0), np.sin(2.0), 0.0])
+    grid = st.grid_from_points(scan, st.Settings(length=LENGTH, effort="quick", plain_at=[tuple(at)]))
+    found = grid.certificate
+    assert found is not None and found.passed and found.handles == 0
+    assert {part.kind for part in found.left_out} == {"limbs"}
+    assert (
+        grid.nodes[:, 0].min() < -RADIUS - 2.5
+        and np.linalg.norm(grid.nodes[:, :2], axis=1)[grid.nodes[:, 0] > -2.0].max() < RADIUS + 0.5
+    )
+
+
+def test_places_of_plain_limbs_are_those_of_the_scan_wherever_its_origin_lies() -> None:
+    limb = outside(rod(0.25, straight(3.0)))
+    scan, far = np.concatenate([ball(), limb, limb * [-1.0, -1.0, 1.0]]), np.array([5e5, -3e6, 120.0])
+    settings = st.Settings(length=LENGTH, limb_girth=0.0, plain_at=[tuple(far + [RADIUS + 2.0, 0.0, 0.0])])
+    samples = sample_surface(st.PointCloud.from_array(scan + far), settings)
+    assert (samples.judged[scan[:, 0] > RADIUS + 0.8] == LIMB).all()
+    assert (samples.judged[scan[:, 0] < RADIUS - 1.0] == KEPT).all()

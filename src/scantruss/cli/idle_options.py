@@ -27,6 +27,8 @@ def idle_options(values: Namespace, cloud: PointCloud, settings: Settings) -> It
         yield f"{', '.join(names)}: for the default method; --method paper does without"
     elif settings.no_ridge_at:
         yield from _places_without_ridge(cloud, settings)
+    if settings.plain_at:
+        yield from _places_without_limb(cloud, settings)
 
 
 def _places_without_ridge(cloud: PointCloud, settings: Settings) -> Iterator[str]:
@@ -44,3 +46,19 @@ def _places_without_ridge(cloud: PointCloud, settings: Settings) -> Iterator[str
     for place in settings.no_ridge_at:
         if len(without(ridges, [np.array(place, float) - samples.origin], settings.length)) == len(ridges):
             yield f"no ridge passes {words_of_place(tuple(place))}, so --no-ridge-at changes nothing there"
+
+
+def _places_without_limb(cloud: PointCloud, settings: Settings) -> Iterator[str]:
+    from ..errors import ScanTrussError, words_of_place
+    from ..surface.samples import sample_surface
+
+    if settings.plain_body:
+        yield "--plain-at: --plain-body takes all limbs off already"
+        return
+    try:
+        kept = sample_surface(cloud, settings.replace(plain_at=())).judged
+        for place in settings.plain_at:
+            if np.array_equal(kept, sample_surface(cloud, settings.replace(plain_at=(place,))).judged):
+                yield f"no thin limb or slit is near {words_of_place(tuple(place))}, so --plain-at changes nothing there"
+    except ScanTrussError:  # which the run says
+        return

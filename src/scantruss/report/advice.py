@@ -187,13 +187,8 @@ class Advice:
             most_lost = max(least + ladder.LOST_ALIKE, ladder.LOST_ALIKE_SHARE * least)
             length = self._losing_less(next(length for length, lost in both.items() if lost <= most_lost))
             return self._following_more(self._found[length])
-        is_large = (
-            ladder.LEAST_TRIED * self._cost(self._usual) >= ladder.POINTS_LOOKED_AT
-        )  # so that fewer grids are made
-        if not (self.passes or is_large):
+        if not self.passes and ladder.LEAST_TRIED * self._cost(self._usual) < ladder.POINTS_LOOKED_AT:
             self._try_last()
-        if not (self.passes or is_large):
-            self._try_beside()
         passing = [trial.length for trial in self.tried if trial.passed]
         if passing:
             left = max(ladder.MOST_IN_ALL - self._spent, ladder.A_FEW)
@@ -226,15 +221,18 @@ class Advice:
         return length_that_follows(self, trial)
 
     def _try_last(self) -> None:
-        """Try more lengths until one passes, with the grids of the table.
+        """Try more lengths until one passes, with the grids of the table, then those beside the usual one.
 
-        They are longer than the usual one, as columns are then seen for what they are; where limbs are too thin, some shorter first.
+        The first are longer than the usual one, as columns are then seen for what they are; where limbs are too thin, some shorter first.
         """
         self._has_table_grids = False
         steps = ladder.LAST_WITH_LIMBS if self._loses_limbs() else ladder.LAST_LENGTHS
         self._count_at(self._usual, ladder.LAST_PER_LENGTH * len(steps))
-        longest = length_range(self._cloud)[1]
-        self._try_each((min(ladder.two_digits(share * self._usual), longest), most) for share, most in steps)
+        self._try_each(
+            (min(ladder.two_digits(share * self._usual), length_range(self._cloud)[1]), most) for share, most in steps
+        )
+        if not self.passes:
+            self._try_beside()
 
     def _try_beside(self) -> None:
         """Try lengths until one passes, where grids and hope are left: that which came nearest, then those beside the usual one.

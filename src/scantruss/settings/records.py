@@ -226,7 +226,7 @@ class SurfaceSettings(_Checked):
     )
     plain_at: Sequence[Sequence[float]] = _setting(
         (),
-        "the same, but only of limbs and slits within three members of each of these places; tried automatically where a grid fails",
+        "take thin limbs off and fill narrow slits within three members of each of these places; tried automatically where a grid fails",
         unit="scan unit",
     )
 

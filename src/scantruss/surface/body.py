@@ -73,14 +73,14 @@ class _Lattice(NamedTuple):
         return voxels
 
 
-Places = tuple[tuple[float, ...], ...]
+PlainPlaces = tuple[tuple[float, ...], ...]
 
 # by the digest of the points, their length and spacing and the places; the one asked for last is the last
-_OPENED: dict[tuple[bytes, float, float, Places], OpenedBody | None] = {}
+_OPENED: dict[tuple[bytes, float, float, PlainPlaces], OpenedBody | None] = {}
 
 
 def opened_body(
-    points: np.ndarray, length: float, spacing: float, given: GivenNormals | None = None, places: Places = ()
+    points: np.ndarray, length: float, spacing: float, given: GivenNormals | None = None, places: PlainPlaces = ()
 ) -> OpenedBody | None:
     """Return the body that points (N, 3) enclose, opened and closed; None where they enclose none, or there is nothing to take off or fill.
 
@@ -106,7 +106,7 @@ def opened_body(
 
 
 def _opened(
-    points: np.ndarray, length: float, spacing: float, given: GivenNormals | None, places: Places
+    points: np.ndarray, length: float, spacing: float, given: GivenNormals | None, places: PlainPlaces
 ) -> OpenedBody | None:
     """Return the body that points (N, 3) enclose, opened and closed, as `opened_body`."""
     found = link_samples(points, max(WALL_SAMPLES * length, 0.25 * spacing), length, spacing, given)
