@@ -115,7 +115,7 @@ def stop_at(command: Command, moment: float, number: int) -> tuple[float, list[s
     with tempfile.TemporaryDirectory() as folder:
         run = Run(command, Path(folder))
         try:
-            run.process.wait(moment)
+            run.process.communicate(timeout=moment)
             return 0.0, []  # it was done before
         except subprocess.TimeoutExpired:
             run.stop(number)
