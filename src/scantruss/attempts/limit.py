@@ -119,9 +119,7 @@ class AttemptLimit:
         self._failing_by_front: list[tuple[Attempt, ScanTrussError]] = []
         self._known_to_fail = [] if earlier is None else earlier._failing_by_front
         self.runs = 0  #: grids that were made
-        self.first_fault: ScanTrussError | None = (
-            None  #: what has come of the first attempt, where it gave no grid that passes
-        )
+        self.first_fault: ScanTrussError | None = None  #: why the first attempt gives no grid that passes
         self._looks_one_sided = self._joins_sheets = False
 
     def allow(self, more: int, stops_early: bool = False) -> None:

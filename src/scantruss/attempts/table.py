@@ -82,8 +82,9 @@ class Attempt:
         before, after = (sample_surface(cloud, each.settings).judged for each in (self, later))
         if not np.array_equal(before, after):
             return later
-        is_first = self.starts is not None or self.row != PLAIN_NEAR_FAULTS
-        return None if is_first else replace(self, starts=layouts_of(self.settings)[SECOND_LAYOUT][0])
+        if self.row != PLAIN_NEAR_FAULTS or self.starts is not None:
+            return None
+        return replace(self, starts=layouts_of(self.settings)[SECOND_LAYOUT][0])
 
     def after_poor(self, places: Sequence[Place], cloud: PointCloud) -> Attempt | None:
         """The same attempt without the wide fold beside each of some poor places [scan unit]; None where it can be no better.

@@ -187,8 +187,7 @@ def grid_with_notes(
         "sharp_edges": "no grid passes without a look at the sharp edges of this body, so it is made as with --sharp-edges",
         "thin_walls": "walls of this scan, or gaps in it, are thinner than a member, so the grid runs on both sides, as with --thin-walls",
         "plain_body": "no grid passes with all thin limbs and slits of this body, so it is made without, as with --plain-body",
-        "plain_at": f"no grid passes with the thin limbs and slits near {len(made.plain_at)} places,"
-        " so it is made without those, as with --plain-at",
+        "plain_at": "no grid passes with all thin limbs and slits of this body, so it is made without some, as with --plain-at",
         "keep_rods": "no grid follows the columns, scaffold or cables of this scan: what was found of them is left out",
         "limb_girth": f"no grid passes with all thin limbs cut off, so it is made as with --limb-girth {made.limb_girth:g}",
         "ridge_angle": "a grid along the folds of this scan fails or is far less even, so it has no ridges, as with --ridge-angle 0",

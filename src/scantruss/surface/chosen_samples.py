@@ -56,9 +56,7 @@ class Asked(NamedTuple):
     smooth_scale: float  #: size of what is smoothed away [`length`]
     sharp_edges: bool  #: whether samples on sharp edges of bodies face away from them
     plain_body: bool  #: whether thin limbs are taken off the body that the scan encloses, and slits filled
-    plain_at: tuple[
-        tuple[float, ...], ...
-    ]  #: places (x, y, z) from the origin near which alone they are, where there are any
+    plain_at: tuple[tuple[float, ...], ...]  #: places from the origin near which they are, where not all are
     thin_walls: bool  #: whether the sides of thin walls are distinguished first
 
     @classmethod
@@ -85,7 +83,9 @@ class Asked(NamedTuple):
             scale,
             settings.sharp_edges,
             settings.plain_body,
-            tuple(tuple((np.array(place, float) - origin).tolist()) for place in settings.plain_at),
+            ()
+            if settings.plain_body
+            else tuple(tuple((np.array(at, float) - origin).tolist()) for at in settings.plain_at),
             settings.thin_walls,
         )
 

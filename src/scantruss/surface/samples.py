@@ -337,7 +337,7 @@ def _prepare(
     added, again = np.zeros((0, 3)), asked._replace(outlier_distance=0.0)
     if asked.is_plain and thinned:
         kept = np.flatnonzero(judged == KEPT)
-        opened = opened_body(scan[kept], length, spacing, given, () if asked.plain_body else asked.plain_at)
+        opened = opened_body(scan[kept], length, spacing, given, asked.plain_at)
         if opened is not None:
             judged[kept[opened.limb]], judged[kept[opened.slit]], added = LIMB, SLIT, opened.added
             left = np.concatenate([scan[judged == KEPT], added])
