@@ -175,6 +175,9 @@ def test_a_slit_is_filled() -> None:
     deep = (np.abs(scan[:, 0]) < 0.3) & (scan[:, 2] > 0.3) & (scan[:, 2] < 2.5) & (np.abs(scan[:, 1]) < 2.5)
     assert opened.slit[deep].mean() > 0.95
     assert not opened.slit[np.abs(scan[:, 0]) > 0.5].any()
+    near = opened_body(scan, LENGTH, SPACING, None, ((0.0, 0.0, 1.5),))
+    assert near is not None and (near.slit == opened.slit).all()
+    assert opened_body(scan, LENGTH, SPACING, None, ((4.0, 0.0, -3.0),)) is None
 
 
 @pytest.mark.parametrize("thick", [0.35, 0.7])
@@ -243,10 +246,8 @@ def test_a_limb_near_a_place_is_left_out_and_said_and_one_elsewhere_is_followed(
     found = grid.certificate
     assert found is not None and found.passed and found.handles == 0
     assert {part.kind for part in found.left_out} == {"limbs"}
-    assert (
-        grid.nodes[:, 0].min() < -RADIUS - 2.5
-        and np.linalg.norm(grid.nodes[:, :2], axis=1)[grid.nodes[:, 0] > -2.0].max() < RADIUS + 0.5
-    )
+    assert grid.nodes[:, 0].min() < -RADIUS - 2.5
+    assert np.linalg.norm(grid.nodes[grid.nodes[:, 0] > -2.0, :2], axis=1).max() < RADIUS + 0.5
 
 
 def test_places_of_plain_limbs_are_those_of_the_scan_wherever_its_origin_lies() -> None:

@@ -147,7 +147,7 @@ class AttemptCourse:
             if (
                 attempt.row == PLAIN_BODY
                 and self._times_plainer == 0
-                and (near := self._with_its_limbs(attempt)) is not None
+                and (near := self._plain_near_first_fault(attempt)) is not None
             ):
                 self._tried, attempt = chain([attempt], self._tried), near
             self._row_begun, self._first_fault, self._fails_by_front = attempt, None, True
@@ -157,8 +157,8 @@ class AttemptCourse:
             self._note(attempt, fault)
         return None
 
-    def _with_its_limbs(self, plain: Attempt) -> Attempt | None:
-        """Return the attempt at a plain body with all of its limbs and slits but those near which the first attempt failed."""
+    def _plain_near_first_fault(self, plain: Attempt) -> Attempt | None:
+        """Return an attempt at a body with all of its limbs and slits but those near which the first attempt failed."""
         kept = plain.settings.replace(plain_body=False, effort=self._settings.effort)
         return self._plainer(replace(plain, settings=kept), self._limit.first_fault)
 

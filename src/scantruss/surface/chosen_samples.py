@@ -9,6 +9,7 @@ import numpy as np
 from ..scan.clean.outliers import has_outliers, judge_points
 from ..scan.cloud import Bounds, bounds_of
 from ..settings import SAMPLE_SPACING, SMOOTH_SAMPLE_SPACING, Settings
+from .body import PlainPlaces
 from .given_normals import GivenNormals
 from .linked_samples import (
     LINK_BOX,
@@ -55,8 +56,8 @@ class Asked(NamedTuple):
     judge_always: bool  #: whether outliers are looked for, and not only points too far apart for the length
     smooth_scale: float  #: size of what is smoothed away [`length`]
     sharp_edges: bool  #: whether samples on sharp edges of bodies face away from them
-    plain_body: bool  #: whether thin limbs are taken off the body that the scan encloses, and slits filled
-    plain_at: tuple[tuple[float, ...], ...]  #: places from the origin near which they are, where not all are
+    #: places from the origin near which thin limbs are taken off the enclosed body, and slits filled; (): everywhere, None: nowhere
+    plain: PlainPlaces | None
     thin_walls: bool  #: whether the sides of thin walls are distinguished first
 
     @classmethod
@@ -68,6 +69,8 @@ class Asked(NamedTuple):
         wish, always = wish_of(settings, origin), settings.judge_outliers == "always" and settings.clean
         rods, piece, scale = settings.keep_rods, settings.piece, settings.smooth_scale or 0.0
         girth = 0.0 if settings.boundary else settings.limb_girth
+        places = () if settings.plain_body else settings.plain_at
+        plain = tuple(tuple((np.array(place, float) - origin).tolist()) for place in places)
         return cls(
             settings.length,
             settings.box_size,
@@ -82,17 +85,9 @@ class Asked(NamedTuple):
             always,
             scale,
             settings.sharp_edges,
-            settings.plain_body,
-            ()
-            if settings.plain_body
-            else tuple(tuple((np.array(at, float) - origin).tolist()) for at in settings.plain_at),
+            plain if settings.is_plain else None,
             settings.thin_walls,
         )
-
-    @property
-    def is_plain(self) -> bool:
-        """Whether limbs are taken off the body that the scan encloses, anywhere."""
-        return self.plain_body or bool(self.plain_at)
 
 
 class ChosenSamples(NamedTuple):
@@ -121,10 +116,8 @@ def _smooth_samples(
 ) -> ChosenSamples | None:
     """Return larger samples if no size is set and the scan is dense, smooth and without outliers, else None."""
     length, radius = asked.length, SMOOTH_SAMPLE_SPACING * asked.length
-    exact = (
-        asked.box_size is not None or asked.judge_always or asked.smooth_scale or asked.sharp_edges or asked.is_plain
-    )
-    if exact or spacing > SPARSE_SPACING * length:
+    exact = asked.box_size is not None or asked.judge_always or asked.smooth_scale or asked.sharp_edges
+    if exact or asked.plain is not None or spacing > SPARSE_SPACING * length:
         return None
     some = thin_dense(points, bounds, radius, spacing) if thinned else points
     found = link_samples(some, radius, length, spacing, given)

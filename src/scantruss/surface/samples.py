@@ -335,9 +335,9 @@ def _prepare(
         left = np.ascontiguousarray(scan[judged == KEPT])
         chosen = usual_samples(left, bounds_of(left), spacing, asked._replace(outlier_distance=0.0), given, thinned)
     added, again = np.zeros((0, 3)), asked._replace(outlier_distance=0.0)
-    if asked.is_plain and thinned:
+    if asked.plain is not None and thinned:
         kept = np.flatnonzero(judged == KEPT)
-        opened = opened_body(scan[kept], length, spacing, given, asked.plain_at)
+        opened = opened_body(scan[kept], length, spacing, given, asked.plain)
         if opened is not None:
             judged[kept[opened.limb]], judged[kept[opened.slit]], added = LIMB, SLIT, opened.added
             left = np.concatenate([scan[judged == KEPT], added])
