@@ -13,9 +13,11 @@ from surfaces import distance_to_triangles
 from typed import known
 
 import scantruss as st
+from scantruss.errors import CertificateError
 from scantruss.front.advance import advance_front
 from scantruss.front.orientation_field import orientation_fields
 from scantruss.improve import tip_search
+from scantruss.improve.candidate import Candidate, grid_of
 from scantruss.improve.optimize import improve_first, improve_last
 from scantruss.improve.tips import (
     FARTHEST_TIP,
@@ -216,6 +218,31 @@ def test_a_grid_reaches_the_end_of_an_ear(monkeypatch: pytest.MonkeyPatch) -> No
     assert known(one.scan_distance).p99 < known(other.scan_distance).p99
     assert one.missing <= other.missing
     assert grid.quality.shape_mean > 0.97
+
+
+@compiled_only
+def test_a_grid_that_fails_with_its_tips_in_the_whole_certificate_alone_is_that_without_them(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    points, settings = eared_ball(1), st.Settings(length=1.0, allow_missing=0.2, ridge_angle=0.0)
+    end, ended = Candidate.end, list[st.Grid]()
+
+    def fail_first(candidate: Candidate) -> None:
+        ended.append(grid_of(candidate))
+        if len(ended) == 1:
+            raise CertificateError("the grid has a tunnel", ended[0])
+        end(candidate)
+
+    monkeypatch.setattr(Candidate, "end", fail_first)
+    grid = st.grid_from_points(points, settings)
+    monkeypatch.setattr(Candidate, "end", end)
+    monkeypatch.setattr(tip_search, "TURNS_OF_TIPS", 0)
+    without = st.grid_from_points(points, settings)
+    assert len(ended) == 2
+    assert ended[0].nodes.shape != without.nodes.shape or (ended[0].nodes != without.nodes).any()
+    assert (grid.nodes == without.nodes).all()
+    assert (grid.triangles == without.triangles).all()
+    assert known(grid.certificate).passed
 
 
 @compiled_only

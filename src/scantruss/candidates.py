@@ -14,7 +14,7 @@ from .front.orientation_field import Field, FieldStart, orientation_fields
 from .improve.candidate import Candidate, grid_of, judged, misses_at_most
 from .improve.longer_search import is_no_worse, search_on, unevenness
 from .improve.optimize import improve_first, improve_last
-from .improve.tip_search import MOST_MISSED, reach_tips_of
+from .improve.tip_search import MOST_MISSED, end_with_tips
 from .runtime.parallel import threaded_map
 from .runtime.progress import Progress, WatchedProgress, seer_of
 from .surface.scratch import with_own_scratch
@@ -156,8 +156,9 @@ def those_that_pass(
             candidate.take(judged(grid, samples, boundary, settings))
             done = is_trial and candidate.passes  # nodes on tips would only make it better
             if not done and samples.rough <= VERY_ROUGH_SCAN and misses_at_most(grid_of(candidate), MOST_MISSED):
-                reach_tips_of(candidate, samples, boundary, constraints, settings)
-            candidate.end()
+                end_with_tips(candidate, samples, boundary, constraints, settings)
+            else:
+                candidate.end()
         except FrontError as error:
             candidate.grid, candidate.fault = None, error
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..check.hanging import any_stands_off
+from ..errors import CertificateError
 from .candidate import Candidate, grid_of, judged, misses_at_most
 from .optimize import put_down, searched_again
 from .perturbation import Spared
@@ -28,6 +29,26 @@ TURNS_OF_TIPS = 5  # times that nodes are put on tips
 # distance from a tip within which alone the grid settles where it failed far from it [member lengths]
 SETTLES_AROUND_TIP = 4.0
 MOST_MISSED = 0.2  # largest share of the scan that a grid may miss where nodes are put on tips
+
+
+def end_with_tips(
+    candidate: Candidate, samples: SurfaceSamples, boundary: Boundary, constraints: Constraints, settings: Settings
+) -> None:
+    """Put nodes on the tips of the scan that a grid misses, and make its whole certificate; of that without them where it fails with them.
+
+    The search for tips asks for no more than what is found soon, and the whole certificate may find a tunnel, say.
+    """
+    first, mesh = candidate.judged, candidate.mesh.copied()
+    assert first is not None
+    reach_tips_of(candidate, samples, boundary, constraints, settings)
+    try:
+        candidate.end()
+    except CertificateError:
+        if candidate.judged is first or not first.certificate.passed:
+            raise
+        candidate.mesh.restore(mesh)
+        candidate.take(first)
+        candidate.end()
 
 
 def reach_tips_of(
