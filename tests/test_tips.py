@@ -245,6 +245,21 @@ def test_a_grid_that_fails_with_its_tips_in_the_whole_certificate_alone_is_that_
     assert known(grid.certificate).passed
 
 
+@pytest.mark.parametrize("handles", [[], ["a tunnel where the scan is closed"]])
+def test_no_tips_are_looked_for_where_a_grid_has_handles_that_its_scan_does_not_have(
+    handles: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    done: list[str] = []
+    monkeypatch.setattr(tip_search, "reach_tips_of", lambda *_: done.append("tips"))
+    candidate = SimpleNamespace(
+        judged=SimpleNamespace(false_handles=handles),
+        mesh=SimpleNamespace(copied=lambda: None),
+        end=lambda: done.append("end"),
+    )
+    tip_search.end_with_tips(*cast(Any, (candidate, 0, 0, 0, 0)))
+    assert done == ["tips"] * (not handles) + ["end"]
+
+
 @compiled_only
 def test_a_ball_has_no_tips(monkeypatch: pytest.MonkeyPatch) -> None:
     points, settings = BALL * on_ball(6000, np.random.default_rng(3)), st.Settings(length=1.0)

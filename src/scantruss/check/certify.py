@@ -6,6 +6,7 @@ A grid that does not pass is refused by `pipeline`: rather no result than a wron
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -88,6 +89,15 @@ class Judged:
         away = self.grid.deviation if self.found is None else self.found.nodes
         return self.grid.replace(certificate=self.whole_certificate(), deviation=away)
 
+    @cached_property
+    def false_handles(self) -> list[Fault]:
+        """Faults where the grid has handles that its scan does not have: no search takes one away."""
+        found, grid, length = self.found, self.grid, self.settings.length
+        if found is None:
+            return []
+        members = _desired_at_points(grid, found, length)
+        return false_handles(grid, self.samples, found.scan / members, self.certificate, length)
+
     def whole_certificate(self) -> Certificate:
         """Return the certificate with all that it says."""
         found, length = self.found, self.settings.length
@@ -106,10 +116,7 @@ class Judged:
             lambda: _at_boundary(grid, samples, boundary, found, followed, members, length),
             lambda: boundary_faults(grid, samples, boundary, length),
             lambda: [] if rough else _beside(grid, samples, found, followed, members),
-            lambda: (
-                cut_apart(grid, samples, found, length),
-                false_handles(grid, samples, found.scan / members, self.certificate, length),
-            ),
+            lambda: (cut_apart(grid, samples, found, length), self.false_handles),
             lambda: mostly_bare(grid, samples, feet, length),
             lambda: [] if rough else rounded_peaks(grid, samples, found, followed, members),
         )

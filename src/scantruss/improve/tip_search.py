@@ -36,11 +36,13 @@ def end_with_tips(
 ) -> None:
     """Put nodes on the tips of the scan that a grid misses, and make its whole certificate; of that without them where it fails with them.
 
-    The search for tips asks for no more than what is found soon, and the whole certificate may find a tunnel, say.
+    The search for tips asks for no more than what is found soon, and the whole certificate may find a tunnel, say; a grid that begins
+    with one keeps it.
     """
     first, mesh = candidate.judged, candidate.mesh.copied()
     assert first is not None
-    reach_tips_of(candidate, samples, boundary, constraints, settings)
+    if not first.false_handles:
+        reach_tips_of(candidate, samples, boundary, constraints, settings)
     try:
         candidate.end()
     except CertificateError:
