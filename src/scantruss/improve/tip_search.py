@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from ..grid.grid import Grid
     from ..settings import Settings
     from ..surface.samples import SurfaceSamples
+    from .working_mesh import Kept
 
 TURNS_OF_TIPS = 5  # times that nodes are put on tips
 # distance from a tip within which alone the grid settles where it failed far from it [member lengths]
@@ -34,45 +35,52 @@ MOST_MISSED = 0.2  # largest share of the scan that a grid may miss where nodes 
 def end_with_tips(
     candidate: Candidate, samples: SurfaceSamples, boundary: Boundary, constraints: Constraints, settings: Settings
 ) -> None:
-    """Put nodes on the tips of the scan that a grid misses, and make its whole certificate; of that without them where it fails with them.
+    """Put nodes on the tips of the scan that a grid misses, and make its whole certificate.
 
-    The search for tips asks for no more than what is found soon, and the whole certificate may find a tunnel, say; a grid that begins
-    with one keeps it.
+    The search for tips asks for no more than what is found soon. Where the whole certificate then finds more, as a tunnel, the grid of the
+    last turn is taken that passes. A grid that begins with a handle that the scan does not have keeps it, with whatever tips.
+
+    Raises
+    ------
+    CertificateError
+        None of them passes; the fault of the last turn.
     """
-    first, mesh = candidate.judged, candidate.mesh.copied()
+    first, fault = candidate.judged, None
     assert first is not None
-    if not first.false_handles:
-        reach_tips_of(candidate, samples, boundary, constraints, settings)
-    try:
-        candidate.end()
-    except CertificateError:
-        if candidate.judged is first or not first.certificate.passed:
-            raise
-        candidate.mesh.restore(mesh)
-        candidate.take(first)
-        candidate.end()
+    before = [] if first.false_handles else reach_tips_of(candidate, samples, boundary, constraints, settings)
+    while True:  # ends: each turn takes one from those before
+        try:
+            return candidate.end()
+        except CertificateError as error:
+            fault = fault or error
+        if not before or not before[-1][0].certificate.passed:
+            raise fault
+        judged_before, kept = before.pop()
+        candidate.mesh.restore(kept)
+        candidate.take(judged_before)
 
 
 def reach_tips_of(
     candidate: Candidate, samples: SurfaceSamples, boundary: Boundary, constraints: Constraints, settings: Settings
-) -> None:
+) -> list[tuple[Judged, Kept]]:
     """Put nodes on the tips of the scan that a grid misses, as long as it is better for it and nothing else goes wrong.
 
-    Each turn finds those that the grid misses by then. In the end the grid is searched again.
+    Each turn finds those that the grid misses by then. In the end the grid is searched again. Returns the grid and the mesh before each
+    turn that was taken.
     """
     search = TipSearch(candidate, samples, boundary, constraints, settings)
-    mesh, reached = candidate.mesh, False
+    mesh = candidate.mesh
     for _ in range(TURNS_OF_TIPS if settings.method == "default" else 0):
         kept, cost = mesh.copied(), candidate.cost_of_tips
         now = search.reach(find_tips(mesh, candidate.front, samples, search.given_up))
-        if now is None or not search.is_taken(now, cost):
+        if now is None or not search.is_taken(now, kept, cost):
             mesh.restore(kept)
             break
-        reached = True
-    if reached and settings.effort != "quick":
+    if search.before and settings.effort != "quick":
         kept, cost = mesh.copied(), candidate.cost_of_tips
-        if not search.is_taken(search.judged(searched_again(mesh, *search.of_scan)), cost):
+        if not search.is_taken(search.judged(searched_again(mesh, *search.of_scan)), kept, cost):
             mesh.restore(kept)
+    return search.before
 
 
 @dataclass(eq=False)
@@ -85,6 +93,7 @@ class TipSearch:
     constraints: Constraints
     settings: Settings
     given_up: list[np.ndarray] = field(default_factory=list)  #: tips (3,) that no node can be put on
+    before: list[tuple[Judged, Kept]] = field(default_factory=list)  #: grid and mesh before each turn that was taken
 
     @property
     def of_scan(self) -> tuple[Grid, SurfaceSamples, Constraints, Settings]:
@@ -142,15 +151,16 @@ class TipSearch:
         faults = self.places_of_faults(now)
         return bool(faults) and not is_suspect(tip, faults, self.candidate.mesh.length)
 
-    def is_taken(self, now: Judged, cost: float) -> bool:
-        """Take the grid that the mesh has become where it passes as far and is better than one of some cost."""
+    def is_taken(self, now: Judged, kept: Kept, cost: float) -> bool:
+        """Take the grid that the mesh has become where it passes as far and is better than that before, of a mesh kept and some cost."""
         candidate, before = self.candidate, self.candidate.judged
         assert before is not None
         candidate.take(now)
-        better = misses_at_most(grid_of(candidate), MOST_MISSED) and candidate.cost_of_tips < cost
-        if not better:
-            candidate.take(before)
-        return better
+        if misses_at_most(grid_of(candidate), MOST_MISSED) and candidate.cost_of_tips < cost:
+            self.before.append((before, kept))
+            return True
+        candidate.take(before)
+        return False
 
 
 def _has_nothing_wrong(now: Judged) -> bool:
