@@ -14,10 +14,10 @@ from scantruss.surface.supports import floor_below
 
 
 def barrel_on_a_floor(rng: np.random.Generator) -> np.ndarray:
-    turn, x = rng.uniform(0, np.pi, 15_000), rng.uniform(0, 30, 15_000)
+    turn, x = rng.uniform(0, np.pi, 9_000), rng.uniform(0, 30, 9_000)
     barrel = np.column_stack([x, 7 * np.cos(turn), 7 * np.sin(turn)])
-    floor = np.column_stack([rng.uniform(-3, 33, 8000), rng.uniform(-10, 10, 8000), np.zeros(8000)])
-    return np.concatenate([barrel, floor]) + rng.normal(0, 0.005, (23_000, 3))
+    floor = np.column_stack([rng.uniform(-3, 33, 4800), rng.uniform(-10, 10, 4800), np.zeros(4800)])
+    return np.concatenate([barrel, floor]) + rng.normal(0, 0.005, (13_800, 3))
 
 
 @pytest.mark.parametrize("unit", ["m", ""])

@@ -93,7 +93,7 @@ def test_a_limb_of_three_members_round_is_kept_to_its_blunt_end(girth: float, ti
 def test_the_peak_of_a_tent_is_no_limb(length: float) -> None:
     """Its masts are as steep as 67 degrees, so that no three members go around it for the last one."""
     draw = np.random.default_rng(15)
-    x, y, drawn = draw.uniform([-7.0, -4.0, 0.0], [7.0, 4.0, 2.6], (60_000, 3)).T
+    x, y, drawn = draw.uniform([-7.0, -4.0, 0.0], [7.0, 4.0, 2.6], (30_000, 3)).T
     rise = 5.2 * np.exp(-np.hypot(np.abs(x) - 3.5, y) / 2.2)
     even = drawn < np.sqrt(1.0 + (rise / 2.2) ** 2)
     points = np.column_stack([x, y, rise])[even]

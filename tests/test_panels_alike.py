@@ -104,10 +104,10 @@ def mean_on_surface(grid: st.Grid) -> float:
 
 
 def test_panels_of_triangles_and_quads_come_to_fewer_kinds_on_their_surface() -> None:
-    for grid in (uneven(7), vault(8, uneven=0.12)):
+    for grid, kinds in ((uneven(7), 2), (vault(8, uneven=0.12), 1)):  # the fewest that it finds
         grid = grid.replace(fixed=np.arange(len(grid.nodes)) == 24)
         mean = float(grid.lengths.mean())
-        found = st.few_panels(grid, 0.02)
+        found = st.few_panels(grid, 0.02, kinds)
         made = found.grid
         assert len(found.representative) < 0.6 * found.before
         assert found.counts.sum() == len(grid.panel_table) == len(found.of)
@@ -116,7 +116,7 @@ def test_panels_of_triangles_and_quads_come_to_fewer_kinds_on_their_surface() ->
             one = int(found.representative[found.of[panel]])
             assert laid(corners(made, panel), corners(made, one)) * made.lengths.mean() / mean <= 0.02 + 1e-9
         assert np.array_equal(made.nodes[24], grid.nodes[24]) and np.array_equal(made.panel_table, grid.panel_table)
-        again = st.few_panels(grid, 0.02)
+        again = st.few_panels(grid, 0.02, kinds)
         assert np.array_equal(again.grid.nodes, made.nodes)
     assert mean_on_surface(made) < 0.05 * mean
 

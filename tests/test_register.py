@@ -24,6 +24,7 @@ from scantruss.scan.register.saving import splice_values
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
 NAMES = ["a", "b", "c", "d"]
+COUNT = 8000  # points all around a body
 OTHER_VIEWS = ("chin", "ear_back", "top")  # of the bunny, from above and below: these take most of the time
 
 
@@ -35,7 +36,7 @@ def clouds_of(scans: Iterable[np.ndarray]) -> list[PointCloud]:
 def scanned() -> tuple[list[np.ndarray], list[np.ndarray], Splice]:
     """Four scans around a body, their poses, and what became of them."""
     rng = np.random.default_rng(4)
-    scans, poses = scans_of(body(1), around(4, rng), rng, noise=0.1)
+    scans, poses = scans_of(body(1), around(4, rng), rng, count=COUNT, noise=0.1)
     return scans, poses, splice_scans(clouds_of(scans), NAMES)
 
 
@@ -43,7 +44,7 @@ def test_scans_come_together_without_help(scanned: tuple[list[np.ndarray], list[
     scans, poses, result = scanned
     turned, moved = errors_of(result.poses, poses, scans, NAMES)
     assert set(result.poses) == set(NAMES) and not result.left_out
-    assert turned < 0.5 and moved < 0.5 * result.spacing
+    assert turned < 0.5 and moved < 0.4 * result.spacing
     assert result.frame == "a" and np.array_equal(result.poses["a"], np.eye(4))
     assert result.spacing == pytest.approx(np.median([measure_spacing(scan) for scan in scans]))
 
@@ -96,17 +97,17 @@ def test_the_same_to_the_byte_with_one_thread(
 def test_a_stranger_is_left_out_by_name(scanned: tuple[list[np.ndarray], list[np.ndarray], Splice]) -> None:
     scans, poses, _ = scanned
     rng = np.random.default_rng(9)
-    stranger, _ = scans_of(body(77), [(1.0, 0.2, 0.1)], rng)
+    stranger, _ = scans_of(body(77), [(1.0, 0.2, 0.1)], rng, count=COUNT)
     result = splice_scans(clouds_of([stranger[0], *scans[:3]]), ["stranger", *NAMES[:3]])
     assert result.left_out == ("stranger",) and result.frame == "a"
     assert not any("stranger" in (pair.first, pair.second) for pair in result.pairs)
     turned, moved = errors_of(result.poses, poses[:3], scans[:3], NAMES[:3])
-    assert turned < 0.5 and moved < 0.5 * result.spacing
+    assert turned < 0.5 and moved < 0.4 * result.spacing
 
 
 def test_scans_without_overlap_are_refused_by_name() -> None:
     rng = np.random.default_rng(2)
-    scans, _ = scans_of(body(1), [(1.0, 0.0, 0.0), (-1.0, 0.0, 0.0)], rng)
+    scans, _ = scans_of(body(1), [(1.0, 0.0, 0.0), (-1.0, 0.0, 0.0)], rng, count=COUNT)
     with pytest.raises(InputError, match="front, back do not fit together"):
         splice_scans(clouds_of(scans), ["front", "back"])
 
@@ -124,7 +125,7 @@ def saddles() -> tuple[list[np.ndarray], list[np.ndarray]]:
     rng = np.random.default_rng(7)
     scans, poses = [], []
     for seed, side in enumerate((-1.0, 1.0)):
-        x, y = np.random.default_rng(seed).uniform(-1, 1, (2, 30_000))
+        x, y = np.random.default_rng(seed).uniform(-1, 1, (2, 12_000))
         whole = np.stack([x, y, 0.45 * (x * x - y * y)], axis=1)
         seen = whole[np.hypot(x - 0.35 * side, y) < 0.75]
         pose = random_pose(rng)
@@ -141,7 +142,7 @@ def test_a_body_that_looks_the_same_when_turned_is_refused_unless_poses_are_give
         splice_scans(clouds_of(scans), NAMES[:2])
     given = splice_scans(clouds_of(scans), NAMES[:2], poses=dict(zip(NAMES, poses, strict=False)))
     turned, moved = errors_of(given.poses, poses, scans, NAMES[:2])
-    assert turned < 0.5 and moved < given.spacing and not given.left_out
+    assert turned < 0.5 and moved < 0.6 * given.spacing and not given.left_out
 
 
 def test_given_poses_that_do_not_hold_do_not_switch_doubt_off(
@@ -153,9 +154,10 @@ def test_given_poses_that_do_not_hold_do_not_switch_doubt_off(
         splice_scans(clouds_of(scans), NAMES[:2], poses={name: random_pose(rng) for name in NAMES[:2]})
 
 
-def test_units_do_not_matter(scanned: tuple[list[np.ndarray], list[np.ndarray], Splice]) -> None:
+def test_units_do_not_matter() -> None:
     """The same scans a thousand times as large, far from the origin."""
-    scans, _, _result = scanned
+    rng = np.random.default_rng(4)
+    scans, _ = scans_of(body(1), around(4, rng)[:3], rng, noise=0.1)
     far = np.array([4e5, 5e6, 100.0])
     large = splice_scans(clouds_of([1000.0 * scan + far for scan in scans[:2]]), NAMES[:2])
     small = splice_scans(clouds_of([*scans[:2], 39.37 * scans[2]]), [*NAMES[:2], "inches"])
@@ -407,11 +409,11 @@ def test_it_can_be_stopped(scanned: tuple[list[np.ndarray], list[np.ndarray], Sp
 
 
 def shared(folder: str, poses: str) -> tuple[list[str], list[PointCloud], list[np.ndarray]]:
-    """Names, clouds and true poses of the scans in a folder of the shared data, every fourth point."""
+    """Names, clouds and true poses of the scans in a folder of the shared data, every eighth point."""
     true = read_poses(DATA / folder / poses)
     names = [name for name in sorted(true) if not name.startswith(OTHER_VIEWS)]  # from the sides alone
     clouds = [st.read_points(DATA / folder / name) for name in names]
-    thinned = [PointCloud.from_array((cloud.points + cloud.origin)[::4]) for cloud in clouds]
+    thinned = [PointCloud.from_array((cloud.points + cloud.origin)[::8]) for cloud in clouds]
     return names, thinned, [true[name] for name in names]
 
 
@@ -424,4 +426,4 @@ def test_shared_scans_come_together_where_the_truth_says(folder: str, poses: str
     result = splice_scans(clouds, names)
     assert not result.left_out
     turned, moved = errors_of(result.poses, true, [cloud.points + cloud.origin for cloud in clouds], names)
-    assert turned < 0.5 and moved < result.spacing
+    assert turned < 0.5 and moved < 0.7 * result.spacing

@@ -433,7 +433,7 @@ def test_a_shell_that_comes_down_to_the_floor_has_no_supports(shape: str) -> Non
 def vault_on_pillars(radius: float) -> np.ndarray:
     """A groin vault of a bay of 8 x 8 on four pillars as high as half of it, without floor and unit."""
     rng = np.random.default_rng(5)
-    x, y = rng.uniform(-4, 4, (2, 40_000))
+    x, y = rng.uniform(-4, 4, (2, 20_000))
     z = 4.0 + np.sqrt(36.0 - (np.minimum(np.abs(x), np.abs(y)) + 2.0) ** 2)
     vault = np.column_stack([x, y, z])[z > 4.6]
     pillars = [pole(rng, x, y, 0.0, 4.6, radius, 1200) for x in (-4, 4) for y in (-4, 4)]

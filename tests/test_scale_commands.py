@@ -21,6 +21,7 @@ from scantruss.runtime.memory import available_memory
 from scantruss.scan.stream import fit
 from scantruss.scan.stream.thinning import thin_points
 
+FEW = 15_000  # points of a plate where their number shows nothing
 HOLE = (22.0, 14.0, 6.0)  # of the plate: centre and radius
 
 
@@ -168,21 +169,22 @@ def test_the_grid_command_thins_what_is_too_large_and_says_so(
 def test_info_looks_at_what_is_too_large_through_boxes(
     place: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    np.save("scan.npy", plate(24_000))
     monkeypatch.setattr(fit, "NEVER_TOO_MANY_POINTS", 1000)
     assert main(["info", "scan.npy"]) == 0
     whole = "".join(capsys.readouterr())
-    assert main(["info", "scan.npy", "--memory", "1MB"]) == 0
+    assert main(["info", "scan.npy", "--memory", "400kB"]) == 0
     said = "".join(capsys.readouterr())
-    assert "thinned while it was read, from 5" in said and "thinned" not in whole
+    assert "thinned while it was read, from 2" in said and "thinned" not in whole
     wished, sizes = ([text.split(word)[1].split("\n")[0] for text in (whole, said)] for word in ("try ", "extent   "))
     assert wished[0] == wished[1]
     one, other = ([float(side) for side in size.split(",")[0].split(" x ")] for size in sizes)
     assert np.allclose(one, other, rtol=0.01)
     assert said.split("boundary  length")[1].count("external") == 1 and said.count("internal") == 1
-    assert main(["info", "scan.npy", "--memory", "1MB", "--length", "4"]) == 0
+    assert main(["info", "scan.npy", "--memory", "400kB", "--length", "4"]) == 0
     assert "in boxes of 0.2;" in capsys.readouterr().err
     for words in (["--thin-spacing", "0"], ["--length", "4", "--thin-spacing", "0"]):
-        assert main(["info", "scan.npy", "--memory", "1MB", *words]) == 0
+        assert main(["info", "scan.npy", "--memory", "400kB", *words]) == 0
         assert "thinned" not in "".join(capsys.readouterr())
     np.save("none.npy", np.full((2000, 3), np.nan))
     assert "no points but NaN" in refused(capsys, "info", "none.npy", "--memory", "1kB")
@@ -250,6 +252,7 @@ def test_other_sizes_are_refused(text: str, place: Path, capsys: pytest.CaptureF
 
 
 def test_a_sweep_tells_of_every_combination(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    np.save("scan.npy", plate(FEW))
     words = ["sweep", "scan.npy", "--length", "5,7,0.1", "--effort", "quick", "--prefer", "balance,shapes"]
     assert main([*words, "-o", "out", "--workers", "1"]) == 0
     said = capsys.readouterr().out
@@ -282,6 +285,7 @@ def test_a_sweep_is_the_same_to_the_byte_on_a_cluster(place: Path, tmp_path: Pat
     import warnings
 
     distributed = pytest.importorskip("distributed")
+    np.save("scan.npy", plate(FEW))
     words = ["sweep", "scan.npy", "--length", "6,8", "--effort", "quick"]
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -342,20 +346,21 @@ def test_several_workers_are_announced_and_change_no_byte(place: Path, capsys: p
 def test_a_sweep_leaves_no_grids_beside_a_table_that_does_not_know_them(
     place: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    np.save("scan.npy", plate(FEW))
     words = ["sweep", "scan.npy", "--effort", "quick", "-o", "out", "--workers", "1"]
-    assert main([*words, "--length", "6,7"]) == 0
-    assert main([*words, "--length", "6,7"]) == 0  # the same once more
+    assert main([*words, "--length", "9,11"]) == 0
+    assert main([*words, "--length", "9,11"]) == 0  # the same once more
     capsys.readouterr()
-    assert "holds grids of another sweep, length-6; name another folder" in refused(capsys, *words, "--length", "7,8")
-    for path in (place / "out").glob("length-6.*"):
+    assert "holds grids of another sweep, length-11; name another folder" in refused(capsys, *words, "--length", "9,10")
+    for path in (place / "out").glob("length-11.*"):
         path.unlink()
     (place / "out" / "length-0.1.json").write_text("{}")
-    assert "length-0.1.json exists already" in refused(capsys, *words, "--length", "7,0.1")
+    assert "length-0.1.json exists already" in refused(capsys, *words, "--length", "9,0.1")
     (place / "out" / "length-0.1.json").write_text('{"made_by": "ScanTruss 0.1.0"}')
-    assert main([*words, "--length", "7,0.1"]) == 0
+    assert main([*words, "--length", "9,0.1"]) == 0
     assert sorted(entry.name for entry in os.scandir("out") if entry.name.startswith("length")) == [
-        "length-7.json",
-        "length-7.png",
+        "length-9.json",
+        "length-9.png",
     ]
 
 
