@@ -5,9 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from hypothesis import given
+from hypothesis import strategies as some
+from scipy.spatial import cKDTree
 
 import scantruss as st
 from scantruss.scan.formats.faces import normals_from_faces
+from scantruss.scan.normals import face_as_given
 from scantruss.surface.given_normals import GivenNormals, given_normals
 from scantruss.surface.samples import sample_surface
 
@@ -71,6 +75,32 @@ def test_faces_of_any_number_of_corners_give_normals() -> None:
     square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0.5, 0]], float)
     normals = normals_from_faces(square, [np.array([[0, 1, 2, 3]]), np.array([[1, 4, 2]])])
     assert normals is not None and np.allclose(normals, [0, 0, 1])
+
+
+@given(some.integers(0, 1000))
+def test_a_point_whose_faces_face_each_other_away_has_no_normal(seed: int) -> None:
+    """Both sides of one triangle, as scanners leave them: what is left of their sum is chance."""
+    points = np.random.default_rng(seed).normal(size=(5, 3))
+    fin, other = np.array([[0, 1, 2], [2, 1, 0]]), np.array([[2, 3, 4]])
+    normals = normals_from_faces(points, [fin, other])
+    assert normals is not None
+    assert (normals[:2] == 0.0).all()
+    across = np.cross(points[3] - points[2], points[4] - points[2])
+    np.testing.assert_allclose(normals[2:], np.tile(across / np.linalg.norm(across), (3, 1)), atol=1e-9)
+
+
+@given(some.integers(0, 1000), some.floats(0.05, 0.95))
+def test_samples_without_a_normal_face_as_those_around_them(seed: int, unknown: float) -> None:
+    """On a ball whose samples all face inwards before, with normals given at some of them alone."""
+    rng = np.random.default_rng(seed)
+    outwards = rng.normal(size=(300, 3))
+    outwards /= np.linalg.norm(outwards, axis=1)[:, None]
+    neighbors = cKDTree(outwards).query(outwards, 9)[1][:, 1:]
+    facing = np.where((rng.random(300) < unknown)[:, None], 0.0, outwards)
+    facing[np.linalg.norm(outwards - outwards[0], axis=1) < 0.6] = 0.0
+    normals = -outwards
+    face_as_given(normals, facing, neighbors)
+    assert ((normals * outwards).sum(axis=1) > 0.99).all() == facing.any()
 
 
 @pytest.mark.parametrize(

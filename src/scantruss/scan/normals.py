@@ -62,14 +62,24 @@ def _counted_off(piece: np.ndarray) -> np.ndarray:
     return number
 
 
-def face_as_given(normals: np.ndarray, facing: np.ndarray) -> None:
-    """Turn normals (S, 3) to the side of those given with the scan (S, 3), zero where unknown.
+def face_as_given(normals: np.ndarray, facing: np.ndarray, neighbors: np.ndarray) -> None:
+    """Turn normals (S, 3) on one side of each sheet to those given with the scan (S, 3), zero where unknown: there as their neighbours.
 
     One that is more than 60 degrees off is replaced by that given.
     """
     cosine = dots(normals, facing)
-    normals[cosine < 0.0] *= -1.0
-    off = (np.abs(cosine) < NEAR_GIVEN) & (dots(facing, facing) > 0.0)
+    known = dots(facing, facing) > 0.0
+    turn = np.where(known, np.where(cosine < 0.0, -1, 1), 0)
+    waiting = np.flatnonzero(~known)
+    while len(waiting):  # ends: each round but the last turns one
+        beside = neighbors[waiting]
+        votes = np.where(beside >= 0, turn[beside], 0).sum(axis=1)
+        if not votes.any():
+            break
+        turn[waiting] = np.sign(votes)
+        waiting = waiting[votes == 0]
+    normals[turn < 0] *= -1.0
+    off = known & (np.abs(cosine) < NEAR_GIVEN)
     normals[off] = facing[off]
 
 

@@ -27,7 +27,7 @@ def faced_surface(
     cut_steep_links(mean, normals, neighbors)
     piece = face_one_side(mean, normals, neighbors, unsure_samples(found, on_edge, length) if on_edge.any() else None)
     if len(found.facing):
-        face_as_given(normals, found.facing)
+        face_as_given(normals, found.facing, neighbors)
     normals = mean_normals(normals, neighbors, 0.7)
     face_outside(mean, normals, piece, neighbors, z_is_up=z_is_up)
     surface = Surface(

@@ -8,6 +8,8 @@ import numpy as np
 
 MOST_TWICE = 0.01  # share of the edges of faces that may run the same way twice: more are not wound alike
 
+LEAST_LEFT = 1e-3  # share of the sizes of its faces that must be left of their sum for a point to have a normal
+
 
 def normals_from_faces(points: np.ndarray, faces: Iterable[np.ndarray]) -> np.ndarray | None:
     """Return the normals at the points of a mesh, the mean of those of their faces by area.
@@ -21,8 +23,8 @@ def normals_from_faces(points: np.ndarray, faces: Iterable[np.ndarray]) -> np.nd
     Returns
     -------
     (N, 3) array or None
-        Unit normals, zero where a point has no face; None where there are no faces, they are damaged, or not wound alike: those
-        normals would say nothing of the two sides of a sheet.
+        Unit normals, zero where a point has no face, or faces that face each other away, as both sides of one triangle; None where
+        there are no faces, they are damaged, or not wound alike: those normals would say nothing of the two sides of a sheet.
     """
     fans = [
         np.stack([face[:, 0], face[:, k], face[:, k + 1]], axis=1)
@@ -36,10 +38,16 @@ def normals_from_faces(points: np.ndarray, faces: Iterable[np.ndarray]) -> np.nd
         return None
     corners = points[triangles]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    total = [np.bincount(triangles.ravel(), np.repeat(across[:, axis], 3), minlength=len(points)) for axis in range(3)]
+    sizes = np.linalg.norm(across, axis=1)
+    *total, most = (
+        np.bincount(triangles.ravel(), np.repeat(each, 3), minlength=len(points)) for each in (*across.T, sizes)
+    )
     normals = np.stack(total, axis=1)
-    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-    return np.divide(normals, lengths, out=np.zeros_like(normals), where=lengths > 0.0)
+    lengths = np.linalg.norm(normals, axis=1)
+    known = lengths > LEAST_LEFT * most
+    normals[known] /= lengths[known, None]
+    normals[~known] = 0.0
+    return normals
 
 
 def _wound_alike(triangles: np.ndarray, points: int) -> bool:
