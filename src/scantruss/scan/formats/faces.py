@@ -8,7 +8,7 @@ import numpy as np
 
 MOST_TWICE = 0.01  # share of the edges of faces that may run the same way twice: more are not wound alike
 
-LEAST_LEFT = 1e-3  # share of the sizes of its faces that must be left of their sum for a point to have a normal
+LEAST_OF_FACES = 1e-3  # share of the sizes of its faces that must be left of their sum for a point to have a normal
 
 
 def normals_from_faces(points: np.ndarray, faces: Iterable[np.ndarray]) -> np.ndarray | None:
@@ -44,7 +44,7 @@ def normals_from_faces(points: np.ndarray, faces: Iterable[np.ndarray]) -> np.nd
     )
     normals = np.stack(total, axis=1)
     lengths = np.linalg.norm(normals, axis=1)
-    known = lengths > LEAST_LEFT * most
+    known = lengths > LEAST_OF_FACES * most
     normals[known] /= lengths[known, None]
     normals[~known] = 0.0
     return normals
