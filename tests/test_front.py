@@ -254,7 +254,7 @@ def assert_sound_or_refused(points: np.ndarray, length: float, method: str) -> N
 
 
 @compiled_only
-@settings(max_examples=60)
+@settings(max_examples=150)
 @given(strategies.integers(0, 1_000_000), strategies.sampled_from([0.4, 0.7, 1.2]), strategies.sampled_from(METHODS))
 def test_rubbish_leaves_no_edge_with_three_triangles_or_is_refused(seed: int, length: float, method: str) -> None:
     assert_sound_or_refused(rubbish(seed), length, method)
