@@ -497,6 +497,18 @@ def test_what_fails_by_its_one_front_is_not_made_again_with_less_effort(monkeypa
             course.outcome()
 
 
+def test_the_first_attempt_is_made_with_each_effort_though_it_fails_by_its_front(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The body is made plain near the faults of the first: with those of more effort a dragon failed that passes with less."""
+    monkeypatch.setattr(Attempt, "after", lambda *_: None)
+    monkeypatch.setattr(Attempt, "has_one_front", lambda *_: True)
+    course = AttemptCourse(st.PointCloud.from_array(CLOUDS["cap"][0]), st.Settings(length=1.0))
+    made = driven(course, dict.fromkeys(NAMES, refused("manifold")))
+    assert [each.row for each in made if each.settings.effort == "quick"] == [AS_ASKED]
+    assert len(made) > 2
+
+
 def test_a_refusal_has_the_whole_certificate_and_others_are_not_made() -> None:
     made: list[str] = []
 

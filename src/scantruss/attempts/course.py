@@ -82,8 +82,8 @@ class AttemptCourse:
       bones; once, as the last attempt. It is taken where it is far evener and hardly farther from the scan.
     - `WITH_LEAST_EFFORT`: only the plain body passes, and leaves out a part of the scan; as asked with the least effort, as the last
       attempt, with ridges given up where it fails near them. That which follows more of the scan is taken: more effort never gives less.
-    - least effort: none passes, and sheets are not too near each other; all attempts again, once: more effort never gives less. Those
-      are left out that fail by their one front, which is the same with any effort, or by the limbs that were cut off before it.
+    - least effort: none passes, and sheets are not too near each other; all attempts again, once: more effort never gives less. All but
+      the first are left out that fail by their one front, which is the same with any effort, or by the limbs that were cut off before it.
 
     Parameters
     ----------
@@ -151,7 +151,8 @@ class AttemptCourse:
             ):
                 self._tried, attempt = chain([attempt], self._tried), near
             self._row_begun, self._first_fault, self._fails_by_front = attempt, None, True
-            if (fault := self._limit.known_fault(attempt)) is None:
+            # the first is made with each effort: limbs and slits are left aside near the faults of that alone
+            if self._limit.first_fault is None or (fault := self._limit.known_fault(attempt)) is None:
                 return attempt
             self._limit.begin()
             self._note(attempt, fault)
