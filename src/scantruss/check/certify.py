@@ -93,7 +93,7 @@ class Judged:
     def false_handles(self) -> list[Fault]:
         """Faults where the grid has handles that its scan does not have: no search takes one away."""
         found, grid, length = self.found, self.grid, self.settings.length
-        if found is None:
+        if found is None or not self.certificate.handles:
             return []
         members = _desired_at_points(grid, found, length)
         return false_handles(grid, self.samples, found.scan / members, self.certificate, length)
