@@ -521,7 +521,8 @@ def test_where_grids_only_leave_out_too_much_the_option_that_accepts_that_is_nam
         found = replace(found, left_out=(LeftOut(kind, 9, share),))
         return LengthTrial(length, None, st.CertificateError("it fails", cast(Any, SimpleNamespace(certificate=found))))
 
-    trials = [missing(0.5, 0.01, Fault("torn", "is torn")), *(missing(k, share) for k, share in enumerate(lost, 1))]
+    trials = [missing(0.5, 0.01, Fault(wrong, "is wrong")) for wrong in ("torn", "sheets")]
+    trials = [*trials, *(missing(k, share) for k, share in enumerate(lost, 1))]
     parts = [without.format(lost[int(each[0]) - 1]) for each in said]
     assert accepted_line(trials) == [
         f"with --length {each} a grid without {part} passes" for each, part in zip(said, parts, strict=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -192,3 +193,23 @@ def test_a_floor_is_one_where_members_are_longer_than_the_room_is_high_at_its_si
     points[~low, 2] += 3.0 - points[~low, 2].min()
     points[~low, 2] = 3.0 + (points[~low, 2] - 3.0) * 2.0 / np.ptp(points[~low, 2])
     assert (find_floor(points, low.astype(np.int64), (0, 1), cell) == 1) == is_floor
+
+
+def test_where_a_small_piece_spoils_a_scan_the_largest_is_tried_alone_and_info_takes_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A saddle beside a Moebius strip, which gets no grid at any length."""
+    rng = np.random.default_rng(3)
+    saddle = plate(rng, 9000, 6.0)
+    turn, across = rng.uniform(0, 2 * np.pi, 5000), rng.uniform(-1, 1, 5000)
+    out = 3 + across * np.cos(turn / 2)
+    strip = np.column_stack([out * np.cos(turn) + 16, out * np.sin(turn), across * np.sin(turn / 2)])
+    monkeypatch.chdir(tmp_path)
+    np.savetxt("two.xyz", np.concatenate([saddle, strip]) + rng.normal(0, 0.003, (14_000, 3)), fmt="%.4f")
+    assert main(["grid", "two.xyz", "a.obj", "--length", "1", "--effort", "quick"]) == 2
+    (said,) = re.findall(r"one-sided.*; the largest piece alone gets a grid with (.*)$", capsys.readouterr().err, re.M)
+    assert main(["info", "two.xyz", *said.split()]) == 0
+    assert f"try {said.partition(' 1 ')[2]}\n" in capsys.readouterr().out
+    assert main(["grid", "two.xyz", "a.obj", *said.split(), "--effort", "quick"]) == 0
+    assert main(["info", "two.xyz"]) == 0
+    assert f"the largest piece alone gets a grid with {said}\n" in capsys.readouterr().out

@@ -63,7 +63,7 @@ def test_a_grid_of_one_sheet_does_not_cover_the_next() -> None:
     used, numbered = np.unique(lower, return_inverse=True)
     half = both.replace(nodes=both.nodes[used], triangles=numbered.reshape(-1, 3))
     (fault,) = faults_on_sheets(half, samples, nodes_of_samples(half, samples, 1.0), 1.0)
-    assert fault.kind == "cover" and fault.words.startswith("leaves out 50%") and fault.where is not None
+    assert fault.kind == "sheets" and fault.words.startswith("leaves out 50%") and fault.where is not None
 
 
 def test_thick_samples_give_up_thin_ones_that_stand_over_them() -> None:

@@ -65,7 +65,7 @@ def faults_on_sheets(grid: Grid, samples: SurfaceSamples, nearest: np.ndarray, l
     faults = []
     if share > LEFT_OUT:
         where = place_of(samples.surface.mean[left[0]] + grid.origin)
-        faults.append(Fault("cover", f"leaves out {share:.0%} of the sheets of the scan", where))
+        faults.append(Fault("sheets", f"leaves out {share:.0%} of the sheets of the scan", where))
     disconnected = disconnected_place(grid, samples, nearest, length)
     if disconnected is not None:
         faults.append(Fault("torn", TORN, place_of(disconnected + grid.origin)))
@@ -110,12 +110,14 @@ def broken_limb(
     from scipy.spatial import cKDTree  # which grids that miss nothing do not load
 
     apart = max(BESIDE_BREAK * length, SPACINGS_BESIDE_BREAK * samples.spacing)
-    followed = np.flatnonzero((samples.judged == KEPT) & (distance <= 0.5 * length))
+    places = samples.scan[(samples.judged == KEPT) & (distance <= 0.5 * length)]
     group = points_together(samples.scan[gone], np.full(len(gone), apart))
     for each in np.unique(group[distance[gone] > length]):
         part = samples.scan[gone[group == each]]
-        away, _ = cKDTree(part).query(samples.scan[followed], distance_upper_bound=2.0 * apart)
-        beside = samples.scan[followed[np.isfinite(away)]]
+        low, high = part.min(axis=0) - 2.0 * apart, part.max(axis=0) + 2.0 * apart
+        near = places[((places >= low) & (places <= high)).all(axis=1)]
+        away, _ = cKDTree(part).query(near, distance_upper_bound=2.0 * apart)
+        beside = near[np.isfinite(away)]
         if not len(beside):
             continue
         sides = np.bincount(points_together(beside, np.full(len(beside), max(apart, BETWEEN_SIDES * length))))

@@ -9,7 +9,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
 
-from ..errors import CertificateError, FormatError, FrontError, LengthError, LinesError
+from ..errors import CertificateError, FormatError, FrontError, LengthError, LinesError, OneSidedError
 from ..settings.values import ROTATION_NUMBERS
 from .outputs import claim, inputs_of, outs_of
 from .shared import (
@@ -178,6 +178,10 @@ def grid_with_notes(
             lead = words_of_floor(bars, cloud, settings) or nearby_words(bars, cloud, settings, advice, error)
             words = f"{error}{lead}"
             raise type(error)(words, error.grid, error.where) from None
+        except OneSidedError as error:
+            from .largest_piece import words_of_largest_piece
+
+            raise OneSidedError(f"{error}{words_of_largest_piece(bars, cloud, settings)}") from None
     made = grid.settings or settings
     smoothed = made.smooth_scale != settings.smooth_scale
     if smoothed:
@@ -254,17 +258,19 @@ def nearby_words(
     """Name the nearest length at which a grid passes, tried by quick runs; nothing if lengths vary over the scan."""
     from ..report.advice import Advice
     from ..report.lengths import accepted_line
+    from .largest_piece import words_of_largest_piece
 
     if settings.length_field:
         return ""
     unit = f" {cloud.unit}" if cloud.unit else ""
     if advice is not None and advice.tried and not advice.passes:
         lengths = f"{advice.tried[0].length:g} to {advice.tried[-1].length:g}{unit}"
-        way_out = accepted_line(advice.tried) or ["clean or crop the scan where it fails"]
+        alone = words_of_largest_piece(bars, cloud, settings).removeprefix("; ")
+        way_out = accepted_line(advice.tried)[:1] or [alone or "clean or crop the scan where it fails"]
         return f"; no grid passes with the lengths tried, {lengths}, either: {way_out[0]}"
     if (length := Advice(cloud, settings, bars).nearby(settings.length, refused)) is not None:
         return f"; a grid passes with --length {length:g} ({f'{cloud.unit}, ' if cloud.unit else ''}tried with --effort quick)"
-    return (
+    return words_of_largest_piece(bars, cloud, settings) or (
         f"; no grid passes with the lengths tried near {settings.length:g}{unit} either: scantruss info looks for one farther off,"
         " else clean or crop the scan where it fails"
     )

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 def info_parser() -> Parser:
     """Options of ``scantruss info``."""
-    from .options import READING, Parser, add_settings
+    from .options import DECIDING, READING, Parser, add_settings
 
     parser = Parser(
         "info",
@@ -35,6 +35,7 @@ def info_parser() -> Parser:
     parser.add_argument("scan", metavar="SCAN", help=SCAN_HELP)
     add_memory(parser)
     add_settings(parser, ("length", "method", "thin_spacing", *READING))
+    add_settings(parser, DECIDING, "the grid that is to be made of it")
     return parser
 
 
@@ -48,6 +49,7 @@ def info(values: Namespace) -> None:
     from ..scan.member_length import check_length, length_range
     from ..surface.samples import sample_surface
     from .floors import words_of_floor
+    from .largest_piece import words_of_largest_piece
     from .options import has_length, settings_of
 
     settings = settings_of(with_some_length(values))
@@ -60,14 +62,17 @@ def info(values: Namespace) -> None:
             check_length(cloud, settings)
         elif low > high:  # no length is possible, as the lines say
             return
+        words = ""  # of a way out where no length passes
         with note_compiling(bars):
             if not settings.length_field:
                 advice = Advice(cloud, settings, bars)
                 length = settings.length if has_length(values) else advice.suggest()
                 print_table(*advice_rows(advice, length, cloud))
                 print_lines(advice_lines(advice, length, cloud))
-                if not advice.passes and (words := words_of_floor(bars, cloud, settings.replace(length=length))):
-                    print_lines([words.removeprefix("; ")])
+                if not advice.passes:
+                    tried = settings.replace(length=length)
+                    words = words_of_floor(bars, cloud, tried) or words_of_largest_piece(bars, cloud, tried)
+                    print_lines([words.removeprefix("; ")] * bool(words))
                 # a scan that looks one-sided as it is has the boundaries of the grid that passes
                 passing = [trial.grid for trial in advice.tried if trial.passed and trial.length == length]
                 made = passing[0].settings if passing and passing[0] is not None else None
@@ -75,11 +80,11 @@ def info(values: Namespace) -> None:
             try:
                 samples, boundary = find_boundary(sample_surface(cloud, settings), settings, progress=bars)
             except OneSidedError as error:
-                if settings.length_field or str(error) in {
-                    str(each.fault) for each in advice.tried if each.length == length
-                }:
+                if settings.length_field or (
+                    not words and str(error) in {str(each.fault) for each in advice.tried if each.length == length}
+                ):
                     raise
-                return  # why no length passes was said, and it is another reason
+                return  # why no length passes was said, and it is another reason, or a way out was
         note_outliers(bars, cloud, settings, "scantruss grid")
         note_layers(bars, cloud, settings)
         note_pieces(bars, cloud, settings)

@@ -270,11 +270,11 @@ PAPER_ONLY = (
 WITH_OTHERS = ("length_field", "line_names")  #: settings that the options of others set too
 
 
-def add_settings(parser: Parser, names: Sequence[str] = ()) -> None:
-    """Add one option for every field of `Settings` in three parts, or for the named ones; only options that are given are set."""
+def add_settings(parser: Parser, names: Sequence[str] = (), title: str = "the scan") -> None:
+    """Add one option for every field of `Settings` in three parts, or for the named ones in one; only options that are given are set."""
     specs = [spec for record in RECORDS for spec in fields(record) if spec.name not in WITH_OTHERS]
     if names:
-        _add_options(parser.add_argument_group("the scan"), (spec for spec in specs if spec.name in names))
+        _add_options(parser.add_argument_group(title), (spec for spec in specs if spec.name in names))
         return
     by_name = {spec.name: spec for spec in specs}
     _add_options(parser.add_argument_group("EVERYDAY"), (by_name[name] for name in EVERY_DAY))
@@ -320,6 +320,11 @@ def _add_options(group: argparse._ArgumentGroup, specs: Iterable[Field[Any]]) ->
 
 
 READING = ("unit", "z_unit", "classes", "returns", "confidence", "crop")  #: settings that steer how scans are read
+#: settings of a grid that decide at which lengths it passes
+DECIDING = (
+    "piece", "boundary", "fill_holes", "fill_at", "ridge_angle", "no_ridge_at", "outlier_distance", "keep_rods", "limb_girth", "cut_thin",
+    "smooth_scale", "allow_missing",
+)  # fmt: skip
 
 
 def add_reading(parser: Parser) -> None:

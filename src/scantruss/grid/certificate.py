@@ -25,7 +25,7 @@ class Worst:
 class Fault:
     """What is wrong with a grid; "the grid " and `words` make a sentence."""
 
-    #: empty manifold orientable pieces loops crossing folded uneven cover torn astray fixed beyond bridged spike strut tunnel; angle
+    #: empty manifold orientable pieces loops crossing folded uneven cover sheets torn astray fixed beyond bridged spike strut tunnel; angle
     #: short long offset unfollowed rounded as fault or warning; of a warning aside, far, left out, gap, joined, closed, hole, zigzag,
     #: cut, missed, peak, apart, ridge, lost, crushed, stops, fixed
     kind: str

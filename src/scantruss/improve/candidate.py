@@ -92,7 +92,11 @@ def judged(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings: Se
 def misses_at_most(grid: Grid, share: float) -> bool:
     """Whether nothing is wrong with a grid but that it misses some share of the scan at most."""
     found = grid.certificate
-    return found is not None and found.missing <= share and all(fault.kind == "cover" for fault in found.faults)
+    return (
+        found is not None
+        and found.missing <= share
+        and all(fault.kind in ("cover", "sheets") for fault in found.faults)
+    )
 
 
 def grid_of(candidate: Candidate) -> Grid:

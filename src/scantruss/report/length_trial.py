@@ -56,12 +56,12 @@ class LengthTrial:
     @property
     def leaves_out(self) -> bool:
         """Whether the first grid fails as it leaves out too much of the scan."""
-        return self._fails_by("cover")
+        return self._fails_by("cover", "sheets")
 
     @property
     def is_too_long(self) -> bool:
         """Whether the first grid fails as its members are too long for thin parts of the scan: it leaves them out or is torn there."""
-        return self._fails_by("cover", "torn")
+        return self._fails_by("cover", "sheets", "torn")
 
     @property
     def loses_limbs(self) -> bool:

@@ -44,7 +44,7 @@ _TEXTS = (
     (rb"(\s*#[^\n]*\n)*\s*(ST)?C?N?4?n?OFF\b", "an OFF file"),
     (rb"\s*ncols\s+\d+\s+nrows\s+\d+", "a raster (ESRI ASCII grid)"),
     (rb"(?s)(.*\n)?v[ \t]+[-+.\d]+[ \t]+[-+.\d][^\n]*\n", "an OBJ file"),
-    (rb"(?s)\s*[\[{].*[\]\":,]", "a JSON file"),
+    (rb"(?s)\s*(\[\s*[\[{\"\d-]|{\s*\").*[\]\":,]", "a JSON file"),
 )
 
 
