@@ -63,3 +63,27 @@ def test_one_disc_that_is_caught_may_be_tried_again_as_often_as_is_allowed() -> 
     rolling = rolling_disc._RollingDisc(st.sample_surface(*small_scan()).surface, np.ones(1), 10, np.zeros(3))
     for _ in range(2 * rolling_disc.MOST_TRIES):
         rolling.watch.note(len(rolling.path), np.zeros(3))
+
+
+def test_the_loops_of_samples_are_rolled_once_and_so_is_what_cannot_be_followed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    cloud, settings = small_scan()
+    samples, rolled = st.sample_surface(cloud, settings), []
+    roll = rolling_disc.boundary_loops
+    monkeypatch.setattr(rolling_disc, "boundary_loops", lambda *given: rolled.append(given[2]) or roll(*given))
+    monkeypatch.setattr(rolling_disc, "MOST_TOUCHES", 0.0)
+    monkeypatch.setattr(watch, "SPARE_STEPS", 0)
+    told = set()
+    for effort in ("quick", "normal"):
+        with pytest.raises(st.FrontError, match="the boundary cannot be followed") as refusal:
+            st.find_boundary(samples, settings.replace(effort=effort))
+        told.add((str(refusal.value), refusal.value.where))
+    assert len(rolled) == len(told) == 1
+    monkeypatch.undo()
+    wider = settings.replace(boundary_radius=0.6)
+    (loop,), (first,) = (st.find_boundary(samples, each)[1].loops for each in (wider, wider.replace(corner_angle=60.0)))
+    (again,) = st.find_boundary(
+        st.sample_surface(st.PointCloud.from_array(make("gable", 10_000).points), wider), wider
+    )[1].loops
+    assert np.array_equal(loop.points, again.points) and np.allclose(first.length, loop.length, rtol=0.05)

@@ -25,7 +25,7 @@ from .density import disc_beside
 from .given import cut_along
 from .holes import fill_holes
 from .offset import NO_BIAS, NO_TIPS, SamplingBias, offset_curve, sampling_bias_of
-from .rolling_disc import boundary_loops
+from .rolling_disc import loops_of_samples
 from .spikes import without_spikes
 from .touched_points import boundary_points
 from .tube_ends import end_of_tube
@@ -201,9 +201,7 @@ def _find_loops(samples: SurfaceSamples, settings: Settings) -> tuple[list[Loop]
     radius = max(settings.boundary_radius * length, 1.3 * samples.surface.radius, 1.9 * samples.spacing)
     found: list[tuple[np.ndarray, int, SamplingBias, np.ndarray]] = []
     surface = samples.surface._replace(normals=broad_normals(samples.surface))
-    rolled, short = boundary_loops(
-        surface, samples.piece, radius, 0.8 * settings.bridged_boundary_length, samples.on_edge, samples.origin
-    )
+    rolled, short = loops_of_samples(samples, surface, radius, 0.8 * settings.bridged_boundary_length)
     loops = [loop for loop in rolled if loop.piece in samples.pieces]
     bridged = [surface.mean[loop.samples] for loop in short if loop.piece in samples.pieces]
     paper = settings.method == "paper"

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import weakref
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from ..errors import FrontError
 from ..kernels.boundary import loops as kernels
 from ..kernels.surface.local_surface import Surface
 from ..runtime.parallel import in_parts
@@ -14,6 +16,9 @@ from ..scan.normals import NORMALS_PER_THREAD
 from ..scan.vectors import dots
 from ..surface.scratch import with_own_scratch
 from .curves import length_around
+
+if TYPE_CHECKING:
+    from ..surface.samples import SurfaceSamples
 
 NO_FREE_DIRECTION = 9.0  # stands for no free direction
 # touches that are expected however few samples are at the edge: a disc that is caught may be tried again many times
@@ -29,6 +34,26 @@ class Rolled(NamedTuple):
 
     samples: np.ndarray  #: (H,) in order
     piece: int  #: that they bound
+
+
+_Loops = tuple[list[Rolled], list[Rolled]]
+_KEPT: weakref.WeakKeyDictionary[SurfaceSamples, dict[tuple[float, float], _Loops | FrontError]] = (
+    weakref.WeakKeyDictionary()
+)
+
+
+def loops_of_samples(samples: SurfaceSamples, surface: Surface, radius: float, least: float) -> _Loops:
+    """Return what `boundary_loops` does for samples, or why it fails; kept for as long as the samples exist."""
+    kept = _KEPT.setdefault(samples, {})
+    if (radius, least) not in kept:
+        try:
+            kept[radius, least] = boundary_loops(surface, samples.piece, radius, least, samples.on_edge, samples.origin)
+        except FrontError as error:  # without its traceback, which would keep the samples
+            kept[radius, least] = FrontError(str(error), where=error.where)
+    found = kept[radius, least]
+    if isinstance(found, FrontError):
+        raise FrontError(str(found), where=found.where)
+    return found
 
 
 def boundary_loops(

@@ -192,16 +192,16 @@ def roll_disc(
     count, came_from = 1, -1
     noise = 0.2 * surface.length
     step = 2.0 * math.pi / SWEEP_BINS
-    cover = np.empty(SWEEP_BINS + 1, np.int64)
+    cover, touches = np.empty(SWEEP_BINS + 1, np.int64), np.empty(len(surface.queue))
     while count < len(path):
         normal, place, radius = row(surface.normals, sample), row(surface.mean, sample), radii[sample]
         u = across(normal)
         v = cross(normal, u)
         d = subtract(centre, place)
         phi = math.atan2(dot(d, v), dot(d, u))
-        found = flood(surface, sample, place, 2.0 * radius)
         cover[:] = 0
-        for i in range(1, found):
+        near = 0  # samples that a disc which touches this one may touch too
+        for i in range(1, flood(surface, sample, place, 2.0 * radius)):
             s = surface.queue[i]
             if dot(row(surface.normals, s), normal) < SAME_SHEET_COSINE or banned[s]:
                 continue
@@ -214,22 +214,18 @@ def roll_disc(
                 cover[end] -= 1
                 if end <= begin:
                     cover[0] += 1
+                surface.queue[near], touches[near] = s, angle - half
+                near += 1
         clear = _nearest_clear(cover)
         phi += (clear + 0.5) * step if clear < SWEEP_BINS else 0.0
         slack = 0.0 if clear < SWEEP_BINS else 0.35
         least, to, to_angle = 1e300, -1, 0.0
-        for i in range(1, found):
-            s = surface.queue[i]
-            if dot(row(surface.normals, s), normal) < SAME_SHEET_COSINE or banned[s]:
-                continue
-            angle, distance = _polar(place, normal, u, v, row(surface.mean, s), noise)
-            if distance < 2.0 * radius:
-                touch = angle - math.acos(distance / (2.0 * radius))
-                turn = (touch - phi) % (2.0 * math.pi)
-                if turn > 2.0 * math.pi - slack and s != came_from:
-                    turn -= 2.0 * math.pi
-                if turn < least:
-                    least, to, to_angle = turn, s, touch
+        for i in range(near):
+            turn = (touches[i] - phi) % (2.0 * math.pi)
+            if turn > 2.0 * math.pi - slack and surface.queue[i] != came_from:
+                turn -= 2.0 * math.pi
+            if turn < least:
+                least, to, to_angle = turn, surface.queue[i], touches[i]
         if to < 0:
             return 0, 0, count
         centre = along(along(place, radius * math.cos(to_angle), u), radius * math.sin(to_angle), v)
