@@ -312,6 +312,16 @@ def test_a_wrong_suffix_is_named_with_what_the_file_is(tmp_path: Path) -> None:
                 read_points(wrong)
 
 
+def test_only_what_may_be_json_is_called_that(tmp_path: Path) -> None:
+    path = tmp_path / "a.pts"
+    path.write_text('{"type": "Point", "coordinates": [1, 2, 3]}\n')
+    with pytest.raises(FormatError, match="but a JSON file;"):
+        read_points(path)
+    path.write_bytes(b"[Expe/PointSet/Binary/0.1]\nproperty position 12\n" + np.ones(300, np.float32).tobytes())
+    with pytest.raises(FormatError, match="but other binary data;"):
+        read_points(path)
+
+
 def test_missing_empty_folder_and_unknown_suffix(tmp_path: Path) -> None:
     (tmp_path / "empty.ply").touch()
     (tmp_path / "folder.ply").mkdir()
