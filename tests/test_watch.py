@@ -71,7 +71,7 @@ def test_the_loops_of_samples_are_rolled_once_and_so_is_what_cannot_be_followed(
     cloud, settings = small_scan()
     samples, rolled = st.sample_surface(cloud, settings), []
     roll = rolling_disc.boundary_loops
-    monkeypatch.setattr(rolling_disc, "boundary_loops", lambda *given: rolled.append(given[2]) or roll(*given))
+    monkeypatch.setattr(rolling_disc, "boundary_loops", lambda *given: rolled.append(given[3]) or roll(*given))
     monkeypatch.setattr(rolling_disc, "MOST_TOUCHES", 0.0)
     monkeypatch.setattr(watch, "SPARE_STEPS", 0)
     told = set()

@@ -151,7 +151,8 @@ def find_boundary(
     kept = _KEPT.get(samples)
     if kept is None or kept[0] != settings:
         came_with_scan = samples.given is not None and not settings.thin_walls
-        check_two_sided(samples.surface, samples.thickness, with_normals=came_with_scan)
+        thickness = np.where(samples.kept, samples.thickness, np.inf)  # a piece that gets no grid may be one-sided
+        check_two_sided(samples.surface, thickness, with_normals=came_with_scan)
         if progress:
             progress("boundary", 0.4)
         filled, boundary = (_given if settings.boundary else _close_holes)(samples, settings)
@@ -201,9 +202,8 @@ def _find_loops(samples: SurfaceSamples, settings: Settings) -> tuple[list[Loop]
     radius = max(settings.boundary_radius * length, 1.3 * samples.surface.radius, 1.9 * samples.spacing)
     found: list[tuple[np.ndarray, int, SamplingBias, np.ndarray]] = []
     surface = samples.surface._replace(normals=broad_normals(samples.surface))
-    rolled, short = loops_of_samples(samples, surface, radius, 0.8 * settings.bridged_boundary_length)
-    loops = [loop for loop in rolled if loop.piece in samples.pieces]
-    bridged = [surface.mean[loop.samples] for loop in short if loop.piece in samples.pieces]
+    loops, short = loops_of_samples(samples, surface, radius, 0.8 * settings.bridged_boundary_length)
+    bridged = [surface.mean[loop.samples] for loop in short]
     paper = settings.method == "paper"
     disc = disc_beside(samples, surface, radius, widens=not paper)
     slid, whole = boundary_points(samples, surface, [loop.samples for loop in loops], disc, CURVE_STEP * length)

@@ -47,7 +47,9 @@ def loops_of_samples(samples: SurfaceSamples, surface: Surface, radius: float, l
     kept = _KEPT.setdefault(samples, {})
     if (radius, least) not in kept:
         try:
-            kept[radius, least] = boundary_loops(surface, samples.piece, radius, least, samples.on_edge, samples.origin)
+            kept[radius, least] = boundary_loops(
+                surface, samples.piece, samples.kept, radius, least, samples.on_edge, samples.origin
+            )
         except FrontError as error:  # without its traceback, which would keep the samples
             kept[radius, least] = FrontError(str(error), where=error.where)
     found = kept[radius, least]
@@ -57,9 +59,15 @@ def loops_of_samples(samples: SurfaceSamples, surface: Surface, radius: float, l
 
 
 def boundary_loops(
-    surface: Surface, piece: np.ndarray, radius: float, least: float, on_edge: np.ndarray, origin: np.ndarray
-) -> tuple[list[Rolled], list[Rolled]]:
-    """Return the loops of samples that the rolled disc touches: those that are kept, and those no longer than `least`."""
+    surface: Surface,
+    piece: np.ndarray,
+    wanted: np.ndarray,
+    radius: float,
+    least: float,
+    on_edge: np.ndarray,
+    origin: np.ndarray,
+) -> _Loops:
+    """Return the loops of wanted samples (S,) bool that the rolled disc touches: those that are kept, and those no longer than `least`."""
     free = np.empty(len(surface.mean))
     radii = disc_radii(surface, radius)
 
@@ -68,6 +76,7 @@ def boundary_loops(
         kernels.free_directions(own, radii, np.radians(75.0), free, begin, end)
 
     in_parts(len(free), NORMALS_PER_THREAD, look)
+    free[~wanted] = NO_FREE_DIRECTION
     beside = surface.neighbors[on_edge]
     free[on_edge], free[beside[beside >= 0]] = NO_FREE_DIRECTION, NO_FREE_DIRECTION
     rolling = _RollingDisc(surface, radii, int((free < NO_FREE_DIRECTION).sum()), origin)

@@ -15,7 +15,7 @@ LEAST_OF_SCAN = 0.5  # share of the scan that the largest piece is at least
 
 
 def words_of_largest_piece(bars: Bars, cloud: PointCloud, settings: Settings) -> str:
-    """Name a length at which a grid of the largest of several pieces passes, tried by quick runs; nothing if none does."""
+    """Name the nearest length at which a grid of the largest of several pieces passes, tried by quick runs; nothing if none does."""
     from ..report.advice import Advice
     from ..surface.samples import sample_surface
 
@@ -26,7 +26,8 @@ def words_of_largest_piece(bars: Bars, cloud: PointCloud, settings: Settings) ->
         if len(samples.pieces) < 2 or (samples.piece == samples.named_pieces[1]).mean() < LEAST_OF_SCAN:
             return ""
         advice = Advice(cloud, settings.replace(piece="1"), bars)
-        length = advice.suggest()
+        trial = advice.try_length(settings.length)
+        length = trial.length if trial is not None and trial.passed else advice.nearby(settings.length)
     except ScanTrussError:
         return ""
-    return f"; the largest piece alone gets a grid with --piece 1 --length {length:g}" if advice.passes else ""
+    return f"; the largest piece alone gets a grid with --piece 1 --length {length:g}" if length is not None else ""
