@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from shapes import make
@@ -69,9 +71,13 @@ def test_the_loops_of_samples_are_rolled_once_and_so_is_what_cannot_be_followed(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     cloud, settings = small_scan()
-    samples, rolled = st.sample_surface(cloud, settings), []
-    roll = rolling_disc.boundary_loops
-    monkeypatch.setattr(rolling_disc, "boundary_loops", lambda *given: rolled.append(given[3]) or roll(*given))
+    samples, radii, roll = st.sample_surface(cloud, settings), list[float](), rolling_disc.boundary_loops
+
+    def noted(*given: Any) -> Any:
+        radii.append(given[3])
+        return roll(*given)
+
+    monkeypatch.setattr(rolling_disc, "boundary_loops", noted)
     monkeypatch.setattr(rolling_disc, "MOST_TOUCHES", 0.0)
     monkeypatch.setattr(watch, "SPARE_STEPS", 0)
     told = set()
@@ -79,7 +85,7 @@ def test_the_loops_of_samples_are_rolled_once_and_so_is_what_cannot_be_followed(
         with pytest.raises(st.FrontError, match="the boundary cannot be followed") as refusal:
             st.find_boundary(samples, settings.replace(effort=effort))
         told.add((str(refusal.value), refusal.value.where))
-    assert len(rolled) == len(told) == 1
+    assert len(radii) == len(told) == 1
     monkeypatch.undo()
     wider = settings.replace(boundary_radius=0.6)
     (loop,), (first,) = (st.find_boundary(samples, each)[1].loops for each in (wider, wider.replace(corner_angle=60.0)))
