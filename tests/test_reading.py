@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import re
 import struct
 import zipfile
@@ -14,10 +15,12 @@ import pytest
 import trimesh
 from copc_file import copc
 from scan_files import plate, text
+from typed import known
 
 from scantruss.errors import FormatError, InputError
 from scantruss.scan.formats.reading import read_points
 from scantruss.scan.formats.table import READERS
+from scantruss.scan.formats.writing import write_points
 from scantruss.scan.stream.tiles import find_source
 
 DATA = Path(__file__).resolve().parents[2] / "shared" / "data"
@@ -402,3 +405,56 @@ def test_shared_scans_hold_the_points_their_table_says(name: str) -> None:
     cloud = read_points(DATA / name)
     assert len(cloud.points) == table()[name]
     assert cloud.dropped == 0
+
+
+def with_normals() -> tuple[np.ndarray, np.ndarray]:
+    """Points of half a ball and their normals."""
+    rng = np.random.default_rng(5)
+    arms = rng.normal(size=(400, 3))
+    arms[:, 2] = np.abs(arms[:, 2])
+    unit = arms / np.linalg.norm(arms, axis=1)[:, None]
+    return np.round(7.0 * unit, 4) + [100.0, 200.0, 3.0], np.round(unit, 5)
+
+
+@pytest.mark.parametrize("suffix", [".xyz", ".txt", ".csv", ".asc", ".pts", ".xyz.gz"])
+@pytest.mark.parametrize("case", ["bare", "behind colours", "numbered", "named", "commas"])
+def test_normals_in_columns_of_text_are_read_with_or_without_names(tmp_path: Path, suffix: str, case: str) -> None:
+    points, normals = with_normals()
+    columns = [points, normals]
+    if case == "behind colours":
+        columns.insert(1, np.full((len(points), 3), 127))
+    if case == "numbered":
+        columns.insert(0, np.arange(1, len(points) + 1)[:, None])
+    lines = [" ".join(f"{value:.10g}" for value in row) for row in np.column_stack(columns)]
+    if case == "named":
+        lines = [" ".join([line, "0.5"]) for line in lines]
+        lines.insert(0, "x y z NormalX NormalY NormalZ curvature")
+    text = "\n".join(lines) + "\n"
+    text = text.replace(".", ",") if case == "commas" else text
+    path = tmp_path / f"a{suffix}"
+    path.write_bytes(gzip.compress(text.encode()) if suffix.endswith(".gz") else text.encode())
+    cloud = read_points(path)
+    assert np.allclose(cloud.points + cloud.origin, points) and np.allclose(known(cloud.normals), normals)
+
+
+@pytest.mark.parametrize("case", ["whole numbers", "too long", "lines without them"])
+def test_other_columns_are_no_normals(tmp_path: Path, case: str) -> None:
+    points, normals = with_normals()
+    if case == "whole numbers":
+        normals = np.tile([0.0, 0.0, 1.0], (len(points), 1))
+    if case == "too long":
+        normals = 1.1 * normals
+    lines = [" ".join(f"{value:.10g}" for value in row) for row in np.column_stack([points, normals])]
+    if case == "lines without them":
+        lines[300:310] = [" ".join(line.split()[:3]) for line in lines[300:310]]
+    path = tmp_path / "a.xyz"
+    path.write_text("\n".join(lines) + "\n")
+    cloud = read_points(path)
+    assert cloud.normals is None and np.allclose(cloud.points + cloud.origin, points)
+
+
+@pytest.mark.parametrize("suffix", [".xyz", ".txt", ".csv"])
+def test_normals_come_back_from_text(tmp_path: Path, suffix: str) -> None:
+    points, normals = with_normals()
+    write_points(tmp_path / f"a{suffix}", points, normals=normals)
+    assert np.allclose(known(read_points(tmp_path / f"a{suffix}").normals), normals)

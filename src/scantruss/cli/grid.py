@@ -265,9 +265,12 @@ def nearby_words(
     unit = f" {cloud.unit}" if cloud.unit else ""
     if advice is not None and advice.tried and not advice.passes:
         lengths = f"{advice.tried[0].length:g} to {advice.tried[-1].length:g}{unit}"
-        alone = words_of_largest_piece(bars, cloud, settings).removeprefix("; ")
-        way_out = accepted_line(advice.tried)[:1] or [alone or "clean or crop the scan where it fails"]
-        return f"; no grid passes with the lengths tried, {lengths}, either: {way_out[0]}"
+        way_out = (
+            "".join(accepted_line(advice.tried))
+            or words_of_largest_piece(bars, cloud, settings).removeprefix("; ")
+            or "clean or crop the scan where it fails"
+        )
+        return f"; no grid passes with the lengths tried, {lengths}, either: {way_out}"
     if (length := Advice(cloud, settings, bars).nearby(settings.length, refused)) is not None:
         return f"; a grid passes with --length {length:g} ({f'{cloud.unit}, ' if cloud.unit else ''}tried with --effort quick)"
     return words_of_largest_piece(bars, cloud, settings) or (

@@ -26,7 +26,8 @@ from .packed import unpacked
 from .paths import FileNames, files_of, name_of_files
 from .table import PACKED, READERS
 
-WITH_NORMALS = (".ply", ".pcd", ".npy", ".npz", ".parquet")  # suffixes of files whose columns of normals are read
+# suffixes of files whose columns of normals are read
+WITH_NORMALS = {".ply", ".pcd", ".npy", ".npz", ".parquet", ".xyz", ".txt", ".csv", ".pts", ".asc"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +105,8 @@ def read_part(path: Path, unit: str, selection: Selection, common: str = "") -> 
     def places_of(header: Content) -> list[WantedBox]:
         return places_in_file(path, header, unit, selection, common)
 
-    wanted = (*selection.needs, *(NORMAL_COLUMNS if path.suffix.lower() in WITH_NORMALS else ()))
+    has_columns = not WITH_NORMALS.isdisjoint(suffix.lower() for suffix in path.suffixes[-2:])  # .xyz.gz too
+    wanted = (*selection.needs, *(NORMAL_COLUMNS if has_columns else ()))
     content = read_content(path, wanted, places_of if selection.crop else None)
     if all(name in content.attributes for name in NORMAL_COLUMNS):
         content = replace(content, normals=np.column_stack([content.attributes[name] for name in NORMAL_COLUMNS]))

@@ -44,6 +44,17 @@ class TextRows(NamedTuple):
 def read_text(path: Path, wanted: Sequence[str] = ()) -> Content:
     """Return the points of a text file and the wanted attributes that its header names."""
     layout = find_layout(path, wanted)
+    bare = layout.without_normals()
+    try:
+        return _read(path, layout)
+    except FormatError:
+        if layout == bare:
+            raise
+        return _read(path, bare)  # some lines have no normal
+
+
+def _read(path: Path, layout: Layout) -> Content:
+    """Return the points and attributes of a layout."""
     width = len(layout.columns)
     columns = (*layout.columns, *(column for _, column in layout.attributes))
     parts = [read_lines(path, block, layout, columns, begin) for begin, block in _blocks(path, layout)]

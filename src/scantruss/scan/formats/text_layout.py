@@ -12,14 +12,25 @@ import numpy as np
 
 from ...errors import FormatError
 from ..units import metres_of_columns, metres_of_comments
-from .columns import check_not_degrees, find_attributes, fit_columns
+from .columns import NORMAL_COLUMNS, check_not_degrees, find_attributes, fit_columns
 from .kinds import is_text, kind_of, read_head, wrong_kind
 from .own_colors import COLOR_ATTRIBUTES
-from .text_fields import ANY_SEPARATOR, NUMBER_COMMA, count_numbers, header_names, holds_three, is_number, split_line
+from .text_fields import (
+    ANY_SEPARATOR,
+    NUMBER_COMMA,
+    count_numbers,
+    header_names,
+    holds_three,
+    is_number,
+    number_of,
+    split_line,
+)
 
 BYTES_EXAMINED = 1 << 16  # bytes examined at the start and in the middle
 WIDTH_OF_PTS = 7  # x y z intensity red green blue, as scanners write it without names
 LINES_EXAMINED = 1000  # lines examined in each part
+# fewest rows, share of all rows, that hold a unit vector where a file has normals that no header names, and how far their length is off
+FEWEST_NORMALS, MOST_UNIT, OFF_UNIT = 20, 0.95, 0.01
 BOM = b"\xef\xbb\xbf"  # how UTF-8 may start
 LINE_BREAK = re.compile(r"\r\n|\n|\r")
 THOUSANDS = re.compile(r"[+-]?(?:[1-9]\d{0,2}(?:,\d{3})?|0)")  # 1,234 may be either
@@ -52,6 +63,11 @@ class Layout:
     metres: float | None = None  #: metres per unit of x and y, where a comment or the names of the columns say it
     z_metres: float | None = None  #: ... of z
     header: tuple[str, ...] = ()  #: the lines before the first point
+
+    def without_normals(self) -> Layout:
+        """Return the layout with all attributes but normals."""
+        others = tuple((name, column) for name, column in self.attributes if name not in NORMAL_COLUMNS)
+        return replace(self, attributes=others)
 
     @property
     def plain(self) -> bool:
@@ -94,7 +110,34 @@ def find_layout(path: Path, wanted: Sequence[str] = ()) -> Layout:
         raise wrong_kind(path, head, "a text file of points")
     layout = _finish(start, data, columns, encoding, separator, comma)
     _check_no_points(path, start[: layout.skip], separator, comma)
-    return _with_header(path, layout, start[: layout.skip], wanted)
+    layout = _with_header(path, layout, start[: layout.skip], wanted)
+    if layout.named or not set(NORMAL_COLUMNS) <= set(wanted):
+        return layout
+    return _with_unnamed_normals(layout, [row for _, row in data] + [split_line(row, separator) for row in middle])
+
+
+def _with_unnamed_normals(layout: Layout, rows: Sequence[Sequence[str]]) -> Layout:
+    """Return a layout with three columns behind the coordinates as normals where they are unit vectors in nearly all rows.
+
+    Whole numbers alone are none: 0 0 1 may be marks of any kind.
+    """
+    for column in range(layout.columns[-1] + 1, layout.width - 2):
+        vectors = np.array([_numbers_of(row[column : column + 3], layout.comma) for row in rows])
+        is_unit = np.abs(np.linalg.norm(vectors, axis=1) - 1.0) < OFF_UNIT
+        if (
+            is_unit.sum() >= max(FEWEST_NORMALS, MOST_UNIT * len(rows))
+            and (vectors[is_unit] % 1.0).any(axis=1).mean() > 0.5
+        ):
+            columns = zip(NORMAL_COLUMNS, range(column, column + 3), strict=True)
+            return replace(layout, attributes=(*layout.attributes, *columns))
+    return layout
+
+
+def _numbers_of(fields: Sequence[str], comma: bool) -> tuple[float, ...]:
+    """Return three fields as numbers, NaN where they are none."""
+    if len(fields) < 3 or not all(is_number(field, comma) for field in fields):
+        return (np.nan,) * 3
+    return tuple(number_of(field, comma) for field in fields)
 
 
 def _with_header(path: Path, layout: Layout, header: Sequence[str], wanted: Sequence[str]) -> Layout:
