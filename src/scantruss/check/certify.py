@@ -190,6 +190,8 @@ def judge(grid: Grid, samples: SurfaceSamples, boundary: Boundary, settings: Set
     ]
     too_far, poor = limits_of(grid, found, settings)
     known = {fault.kind for fault in faults}
+    if "cover" in known:
+        known.add("sheets")  # of what is left out already
     on_sheets = faults_on_sheets(grid, samples, nearest, length)
     if not any(fault.kind == "torn" for fault in on_sheets):
         on_sheets += torn_apart(samples, found.scan * length / members, length)
