@@ -15,10 +15,11 @@ import scantruss as st
 from scantruss.check.distances import boxes_of, distances_to_planes, points_of_planes
 from scantruss.check.limits import NOISES_OFF
 from scantruss.improve.equalize import equalize
-from scantruss.improve.mend import fold_angles_of, mend_poor_places, poor_places
+from scantruss.improve.mend import mend_poor_places, poor_places
 from scantruss.improve.off_scan import MOST_OFF, put_on_scan
 from scantruss.improve.working_mesh import Kept, WorkingMesh
 from scantruss.kernels.mesh.grid import list_triangles, split
+from scantruss.kernels.mesh.poor_places import faults_of_triangles
 from scantruss.surface.samples import SurfaceSamples, sample_surface
 
 
@@ -81,22 +82,51 @@ def test_a_grid_without_poor_places_keeps_its_bytes() -> None:
     assert all((one == other).all() for one, other in zip(before.net, mesh.net, strict=True))
 
 
-@given(some.integers(0, 1000))
-def test_angles_between_triangles_are_those_of_their_normals(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    grid = rough_disc(length=0.35, points=500, seed=seed).grid
-    nodes, triangles = grid.nodes + 0.2 * rng.normal(size=grid.nodes.shape), grid.triangles.tolist()
+def angle(one: np.ndarray, other: np.ndarray) -> float:
+    """The angle between two vectors [degree]."""
+    return float(np.degrees(np.arccos(np.clip(one @ other / np.linalg.norm(one) / np.linalg.norm(other), -1.0, 1.0))))
+
+
+def faults_beyond(mesh: WorkingMesh, limits: tuple[float, float, float, float]) -> dict[tuple[int, ...], float]:
+    """How far each triangle of a mesh is beyond the limits of `faults_of_triangles`."""
+    net = mesh.net
+    room = np.empty((len(net.nodes) * 3, 3), np.int64)
+    triangles, nodes = room[: list_triangles(net, room)].tolist(), net.nodes
+    shortest, longest, narrowest, flattest = limits
     normals = [np.cross(nodes[b] - nodes[a], nodes[c] - nodes[a]) for a, b, c in triangles]
-    found = fold_angles_of(nodes, grid.triangles)
+    found = {}
     for t, triangle in enumerate(triangles):
+        fault, held = 0.0, mesh.fixed[triangle].all()
         for k in range(3):
-            side = {triangle[k], triangle[(k + 1) % 3]}
-            beyond = [u for u, other in enumerate(triangles) if u != t and side <= set(other)]
-            angle = 180.0
-            for u in beyond:
-                cosine = normals[t] @ normals[u] / np.linalg.norm(normals[t]) / np.linalg.norm(normals[u])
-                angle -= float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))))
-            assert found[t, k] == pytest.approx(angle, abs=1e-4)
+            a, b, c = (triangle[(k + j) % 3] for j in range(3))
+            size = np.linalg.norm(nodes[b] - nodes[a]) / (0.5 * mesh.length * (net.desired[a] + net.desired[b]))
+            if not mesh.fixed[[a, b]].all():
+                fault += max(1.0 - size / shortest, size / longest - 1.0, 0.0)
+            if not held:
+                fault += max(1.0 - angle(nodes[b] - nodes[a], nodes[c] - nodes[a]) / narrowest, 0.0)
+            beyond = [u for u, other in enumerate(triangles) if u != t and {a, b} <= set(other)]
+            fault += sum(max(1.0 - (180.0 - angle(normals[t], normals[u])) / flattest, 0.0) for u in beyond)
+        found[tuple(triangle)] = fault
+    return found
+
+
+@pytest.mark.kernels
+@given(some.integers(0, 1000))
+def test_faults_of_triangles_are_those_of_their_sides_corners_and_folds(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    rough = rough_disc(length=0.45, points=400, seed=seed)
+    mesh = rough.mesh()
+    net = mesh.net
+    net.nodes[:] += 0.15 * rng.normal(size=net.nodes.shape)
+    net.desired[:] = rng.uniform(0.7, 1.4, len(net.desired))
+    mesh.fixed[:] = rng.random(len(mesh.fixed)) < 0.3
+    limits, room = (0.8, 1.2, 40.0, 150.0), 3 * len(net.nodes)
+    triangles, faults = np.empty((room, 3), np.int64), np.empty(room)
+    count = faults_of_triangles(net, mesh.fixed, mesh.length, *limits, triangles, faults)
+    expected = faults_beyond(mesh, limits)
+    assert count == len(expected)
+    found = dict(zip(map(tuple, triangles[:count].tolist()), faults[:count].tolist(), strict=True))
+    assert found == pytest.approx(expected, abs=1e-6)
 
 
 @compiled_only
@@ -110,8 +140,7 @@ def test_triangles_folded_onto_each_other_are_mended() -> None:
     triangles = poor_places(mesh, rough.settings).worst
     assert any(v in triangle for triangle in triangles.tolist())
     assert mend_poor_places(mesh, rough.settings)
-    room = np.empty((int(net.degree[: net.used].sum()) + 1, 3), np.int64)
-    assert fold_angles_of(net.nodes, room[: list_triangles(net, room)]).min() > 90.0
+    assert not any(faults_beyond(mesh, (0.01, 9.0, 0.01, 90.0)).values())
 
 
 @compiled_only

@@ -153,6 +153,19 @@ def test_a_sparse_part_of_the_scan_encloses_the_body_too(apart: float) -> None:
     assert opened is not None and opened.limb.any()
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_random_points_with_empty_places_between_them_enclose_the_body_too(seed: int) -> None:
+    """Points at random, 3.3 to a member on average: somewhere on the ball a place without any is wider than the walls between them."""
+    points, length = ball(7500, seed), 0.55
+    limb = outside(rod(0.3 * length, straight(2.0)))
+    scan = np.concatenate([points, limb])
+    opened = opened_body(scan, length, 0.08)
+    assert opened is not None
+    far = np.linalg.norm(scan, axis=1) - RADIUS
+    assert opened.limb[far > 0.8 * length].all()
+    assert not opened.limb[np.linalg.norm(scan - [RADIUS, 0.0, 0.0], axis=1) > 2.0 + length].any()
+
+
 def test_a_slit_is_filled() -> None:
     """Two boxes side by side on a common base, less than a ball of the slit apart."""
     assert 2 * SLIT_RADIUS > 0.4

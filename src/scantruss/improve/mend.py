@@ -10,9 +10,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..kernels.mesh.figures import angles_of_triangles, folds_of
-from ..kernels.mesh.grid import list_triangles
 from ..kernels.mesh.local_search import COLLAPSE, FLIP, SPLIT, is_allowed, make_move
+from ..kernels.mesh.poor_places import faults_of_triangles
 from ..kernels.mesh.trial import Scratch, gather
 from .equalize import energy_of_grid, new_scratch, settle
 from .fixed_nodes import RINGS_SETTLED, nodes_around
@@ -62,36 +61,22 @@ def mend_poor_places(mesh: WorkingMesh, settings: Settings) -> bool:
 def poor_places(mesh: WorkingMesh, settings: Settings) -> PoorPlaces:
     """Return the triangles with an angle or a member that is not well within the limits of the settings."""
     net = mesh.net
-    room = np.empty((int(net.degree[: net.used].sum()) + 1, 3), np.int64)
-    triangles = room[: list_triangles(net, room)]
-    angles = np.empty(triangles.shape)
-    angles_of_triangles(net.nodes, triangles, angles)
-    after = np.roll(triangles, -1, axis=1)
-    sizes = np.linalg.norm(net.nodes[after] - net.nodes[triangles], axis=2)
-    sizes /= 0.5 * mesh.length * (net.desired[after] + net.desired[triangles])
-    fixed = mesh.fixed[triangles] & mesh.fixed[after]
-    least, most = settings.min_length + POOR_LENGTH_MARGIN, settings.max_length - POOR_LENGTH_MARGIN
-    off = np.where(fixed, 0.0, np.maximum(1.0 - sizes / least, sizes / most - 1.0))
-    narrowest = settings.min_angle + POOR_ANGLE_MARGIN
-    flat = 1.0 - fold_angles_of(net.nodes, triangles) / (settings.min_fold + POOR_FOLD_MARGIN)
-    held = np.asarray(mesh.fixed[triangles].all(axis=1))
-    narrow = np.where(held[:, None], 0.0, 1.0 - angles / narrowest)
-    faults = sum(np.maximum(part, 0.0).sum(axis=1) for part in (off, narrow, flat))
-    order = np.argsort(-faults, kind="stable")[: int((faults > 0.0).sum())]
-    return PoorPlaces(float(faults.sum()), triangles[order])
-
-
-def fold_angles_of(nodes: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Return the angle at each side of triangles (T, 3) to the triangle beyond it (T, 3) [degree]: 180 level and where there is none."""
-    ends = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2).reshape(-1, 2)
-    key = ends.min(axis=1) * len(nodes) + ends.max(axis=1)
-    order = np.argsort(key, kind="stable")
-    same = np.flatnonzero(key[order][1:] == key[order][:-1])
-    sides = np.stack([order[same], order[same + 1]], axis=1)
-    between, angles = np.empty(len(sides)), np.full(len(ends), 180.0)
-    folds_of(nodes, triangles, sides // 3, between)
-    angles[sides] = between[:, None]
-    return angles.reshape(-1, 3)
+    most = int(net.degree[: net.used].sum())  # three times as many as there are
+    triangles, faults = np.empty((most, 3), np.int64), np.empty(most)
+    count = faults_of_triangles(
+        net,
+        mesh.fixed,
+        mesh.length,
+        settings.min_length + POOR_LENGTH_MARGIN,
+        settings.max_length - POOR_LENGTH_MARGIN,
+        settings.min_angle + POOR_ANGLE_MARGIN,
+        settings.min_fold + POOR_FOLD_MARGIN,
+        triangles,
+        faults,
+    )
+    found = faults[:count]
+    order = np.argsort(-found, kind="stable")[: int((found > 0.0).sum())]
+    return PoorPlaces(float(found.sum()), triangles[order])
 
 
 def _mend(

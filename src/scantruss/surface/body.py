@@ -5,7 +5,7 @@ Serra, Image Analysis and Mathematical Morphology, 1982. What is opened away end
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from hashlib import sha256
 from itertools import chain, pairwise, product
@@ -40,6 +40,8 @@ NEIGHBORS_AT_BOUNDARY = 12  # samples around one that show whether it lies at a 
 WIDEST_LINK = 0.8  # largest distance of linked samples between which there is a wall [member lengths]
 SPARSE_LINK = 2.0  # largest distance of such samples where points are sparse, in distances of the sixth neighbour
 DISC_RADIUS, DISC_CORNERS = 1.25, 12  # radius of a disc, in distances of the sixth neighbour, and its corners
+MOST_ENCLOSED = 0.5  # share of the samples beside what is enclosed from which on the walls do not leak
+WIDER_GAPS = 2  # half the width of gaps that are closed where they do [voxels]
 WALL_STEP = 0.9  # distance of places on a wall [voxels]
 OPEN_GAP = 170.0  # angle between linked samples from which on there is no wall between them [degree]
 BOUNDARY_GAP = 130.0  # angle around a sample without others from which on it lies at a boundary [degree]
@@ -116,13 +118,14 @@ def _opened(
     if lattice is None:
         return None
     wall, at_gaps = np.zeros(lattice.shape, np.bool_), _at_gaps(found)
-    for triangles in chain(_fans(found, length), _discs(found, at_gaps, length)):
-        _mark(wall, triangles, lattice)
+    _mark(wall, chain(_fans(found, length), _discs(found, at_gaps, length)), lattice)
     where = NearPlaces(np.reshape(places, (-1, 3)), NEAR_PLACES * length)
-    opened = _open_and_close(points, _enclosed(wall), lattice, length, where)
+    body = _enclosed(wall)
+    if not _bounds_body(found, body, lattice, length):  # random points leave a gap anywhere
+        body = _enclosed(wall, WIDER_GAPS)
+    opened = _open_and_close(points, body, lattice, length, where)
     if opened is None and (caps := _caps(found, at_gaps, length, float(wall.sum()) * lattice.size**2)):
-        for triangles in caps:
-            _mark(wall, triangles, lattice)
+        _mark(wall, caps, lattice)
         opened = _open_and_close(points, _enclosed(wall), lattice, length, where)
     return opened
 
@@ -156,6 +159,13 @@ def _fans(found: Linked, length: float) -> Iterator[np.ndarray]:
         yield corners[wide < widest[closed]]
 
 
+def _bounds_body(found: Linked, enclosed: Voxels, lattice: _Lattice, length: float) -> bool:
+    """Whether the inside of most samples is enclosed, on one side or the other."""
+    deep = LIMB_RADIUS * length * found.normals
+    inside = [enclosed[tuple(np.rint(lattice.of(found.mean + side)).astype(int).T)] for side in (deep, -deep)]
+    return bool((inside[0] | inside[1]).mean() > MOST_ENCLOSED)
+
+
 def _tangents(normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return two unit vectors (S, 3) at right angles to each normal and to each other."""
     first = np.cross(normals, np.eye(3)[np.abs(normals).argmin(axis=1)])
@@ -182,11 +192,11 @@ def _at_gaps(found: Linked) -> NDArray[np.bool_]:
     return at_gaps
 
 
-def _discs(found: Linked, at_gaps: NDArray[np.bool_], length: float) -> Iterator[np.ndarray]:
-    """Yield triangles (K, 3, 3) of a disc around each sample at a gap, so wide that those of neighbours overlap."""
+def _discs(found: Linked, some: NDArray[np.bool_], length: float) -> Iterator[np.ndarray]:
+    """Yield triangles (K, 3, 3) of a disc around each of some samples (S,), so wide that those of neighbours overlap."""
     from scipy.spatial import cKDTree
 
-    middle, (first, second) = found.mean[at_gaps], _tangents(found.normals[at_gaps])
+    middle, (first, second) = found.mean[some], _tangents(found.normals[some])
     if not len(middle):
         return
     sixth = cKDTree(found.mean).query(middle, k=7)[0][:, 6]
@@ -217,27 +227,31 @@ def _caps(found: Linked, at_gaps: NDArray[np.bool_], length: float, area: float)
     return caps if missing < MOST_OPEN * area else []
 
 
-def _mark(wall: Voxels, triangles: np.ndarray, lattice: _Lattice) -> None:
-    """Mark the voxels in which triangles (K, 3, 3) lie."""
-    if not len(triangles):
-        return
-    corners = lattice.of(triangles)
-    edge = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
-    parts = np.maximum(np.ceil(edge / WALL_STEP).astype(int), 1)
-    for count in np.unique(parts):  # places a step apart, by their shares of the corners
-        some = corners[parts == count]
-        for i in range(count + 1):
-            for j in range(count + 1 - i):
-                share = np.array([count - i - j, i, j]) / count
-                wall[tuple(np.rint(np.einsum("c,kci->ik", share, some)).astype(int))] = True
+def _mark(wall: Voxels, triangles: Iterable[np.ndarray], lattice: _Lattice) -> None:
+    """Mark the voxels in which triangles lie, each (K, 3, 3)."""
+    for corners in map(lattice.of, triangles):
+        edge = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+        parts = np.maximum(np.ceil(edge / WALL_STEP).astype(int), 1)
+        for count in np.unique(parts):  # places a step apart, by their shares of the corners
+            some = corners[parts == count]
+            for i in range(count + 1):
+                for j in range(count + 1 - i):
+                    share = np.array([count - i - j, i, j]) / count
+                    wall[tuple(np.rint(np.einsum("c,kci->ik", share, some)).astype(int))] = True
 
 
-def _enclosed(wall: Voxels) -> Voxels:
-    """Return the voxels that cannot be reached from outside through a wall, those of the wall included."""
+def _enclosed(wall: Voxels, gap: int = 1) -> Voxels:
+    """Return the voxels that cannot be reached from outside through a wall, those of the wall included.
+
+    gap : half the width of the gaps in the wall that are closed [voxels]
+    """
     from scipy import ndimage
 
-    label = ndimage.label(~ndimage.binary_dilation(wall))[0]
+    free = ~ndimage.binary_dilation(wall)
+    label = ndimage.label(free if gap == 1 else ~ndimage.binary_dilation(wall, iterations=gap))[0]
     outside = label == label[0, 0, 0]
+    for _ in range(gap - 1):
+        outside = ndimage.binary_dilation(outside, mask=free)
     # farther from outside than 1.5 voxels: half of one, and the thickness of a wall
     enclosed: Voxels = ~ndimage.binary_dilation(outside, ndimage.generate_binary_structure(3, 2))
     return enclosed

@@ -11,7 +11,7 @@ from ..geometry.vectors import Vector, cross, dot, norm, row, subtract
 
 
 @kernel
-def _angle_between(u: Vector, w: Vector) -> float:
+def angle_between(u: Vector, w: Vector) -> float:
     """Angle between two vectors [degree]; 0 if one has no length."""
     return math.degrees(math.atan2(norm(cross(u, w)), dot(u, w) + 0.0))  # atan2(0, -0) would be 180
 
@@ -23,7 +23,7 @@ def angles_of_triangles(nodes: np.ndarray, triangles: np.ndarray, angles: np.nda
         for k in range(3):
             corner = row(nodes, triangles[t, k])
             to = subtract(row(nodes, triangles[t, (k + 1) % 3]), corner)
-            angles[t, k] = _angle_between(to, subtract(row(nodes, triangles[t, (k + 2) % 3]), corner))
+            angles[t, k] = angle_between(to, subtract(row(nodes, triangles[t, (k + 2) % 3]), corner))
 
 
 @kernel
@@ -39,4 +39,4 @@ def folds_of(nodes: np.ndarray, triangles: np.ndarray, two: np.ndarray, angles: 
         angles[e] = math.nan
         if two[e, 1] >= 0:
             first = _normal_of(nodes, triangles, two[e, 0])
-            angles[e] = 180.0 - _angle_between(first, _normal_of(nodes, triangles, two[e, 1]))
+            angles[e] = 180.0 - angle_between(first, _normal_of(nodes, triangles, two[e, 1]))
