@@ -10,9 +10,10 @@ from scipy import ndimage
 
 import scantruss as st
 from scantruss.surface import body
-from scantruss.surface.body import BODIES_KEPT, LIMB_RADIUS, SLIT_RADIUS, _distance, _euler, _Lattice, opened_body
+from scantruss.surface.body import BODIES_KEPT, LIMB_RADIUS, SLIT_RADIUS, opened_body
 from scantruss.surface.chosen_samples import KEPT, LIMB
 from scantruss.surface.samples import sample_surface
+from scantruss.surface.voxels import VoxelLattice, distance_from, euler_of_voxels
 
 LENGTH, RADIUS, SPACING = 1.0, 4.0, 0.1
 Points = NDArray[np.float64]
@@ -55,7 +56,7 @@ def outside(points: Points) -> Points:
 @pytest.mark.parametrize("share", [0.0, 0.002, 0.05, 1.0])
 def test_distances_between_voxels_are_exact_within_their_reach(reach: int, share: float) -> None:
     marked = np.random.default_rng(reach).random((37, 19, 23)) < share
-    found = _distance(marked, _Lattice(np.zeros(3), 0.5, marked.shape), 0.5 * reach)
+    found = distance_from(marked, VoxelLattice(np.zeros(3), 0.5, marked.shape), 0.5 * reach)
     near = 0.5 * ndimage.distance_transform_edt(~marked) if marked.any() else np.full(marked.shape, np.inf)
     within = near <= 0.5 * reach
     assert (found[within] == near[within]).all() and (found[~within] > 0.5 * reach).all()
@@ -227,8 +228,8 @@ def test_the_euler_characteristic_of_voxels_is_parts_less_tunnels_plus_hollows(
     block = np.ones((6, 6, 6), np.bool_)
     for hole in holes:
         block[hole] = False
-    assert _euler(block) == kind
-    assert _euler(np.concatenate([block, np.zeros_like(block), block])) == 2 * kind
+    assert euler_of_voxels(block) == kind
+    assert euler_of_voxels(np.concatenate([block, np.zeros_like(block), block])) == 2 * kind
 
 
 def tailed() -> Points:

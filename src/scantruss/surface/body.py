@@ -5,28 +5,32 @@ Serra, Image Analysis and Mathematical Morphology, 1982. What is opened away end
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from hashlib import sha256
-from itertools import chain, pairwise, product
+from itertools import chain, pairwise
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..kernels.geometry.components import component_labels
-from ..kernels.surface.voxels import squares_across_rows, squares_in_rows
-from ..runtime.parallel import run_in_parts
 from .given_normals import GivenNormals
 from .linked_samples import Linked, link_samples
-
-Voxels = NDArray[np.bool_]
-DistanceField = NDArray[np.float64]  # a value for each voxel
+from .voxels import (
+    VoxelLattice,
+    Voxels,
+    beyond_ball,
+    crossings_of,
+    distance_from,
+    enclosed_by,
+    euler_of_voxels,
+    mark_triangles,
+)
 
 VOXEL_SIZE = 1.0 / 6.0  # size of a voxel [member lengths]
 COARSEST_VOXEL = 0.25  # size of a voxel of a large scan [member lengths]
 MOST_VOXELS = 8_000_000  # voxels above which they are made larger
-PLANES_PER_THREAD = 16  # planes of voxels that a thread looks at, at least
 SURELY_BEYOND = 8  # distance as far as the depth in a body has to be known, where it is smoothed and compared [voxels]
 # of the ball that does not fit into a limb: three members round are a limb of radius 0.48 [member lengths]
 LIMB_RADIUS = 0.45
@@ -42,7 +46,6 @@ SPARSE_LINK = 2.0  # largest distance of such samples where points are sparse, i
 DISC_RADIUS, DISC_CORNERS = 1.25, 12  # radius of a disc, in distances of the sixth neighbour, and its corners
 MOST_ENCLOSED = 0.5  # share of the samples beside what is enclosed from which on the walls do not leak
 WIDER_GAPS = 2  # half the width of gaps that are closed where they do [voxels]
-WALL_STEP = 0.9  # distance of places on a wall [voxels]
 OPEN_GAP = 170.0  # angle between linked samples from which on there is no wall between them [degree]
 BOUNDARY_GAP = 130.0  # angle around a sample without others from which on it lies at a boundary [degree]
 NEAR_GAP = 0.7  # distance of samples of one boundary [member lengths]
@@ -60,19 +63,6 @@ class OpenedBody:
     limb: NDArray[np.bool_]  #: (N,) whether each point lies on what was taken off
     slit: NDArray[np.bool_]  #: (N,) whether it lies in what was filled
     added: np.ndarray  #: (M, 3) points on the surface where there are none: over limbs and slits
-
-
-class _Lattice(NamedTuple):
-    """Where the voxels are."""
-
-    low: np.ndarray  #: (3,) middle of the first [scan unit]
-    size: float  #: [scan unit]
-    shape: tuple[int, int, int]
-
-    def of(self, places: np.ndarray) -> np.ndarray:
-        """Return places (N, 3) in voxels."""
-        voxels: np.ndarray = (places - self.low) / self.size
-        return voxels
 
 
 PlainPlaces = tuple[tuple[float, ...], ...]
@@ -118,19 +108,19 @@ def _opened(
     if lattice is None:
         return None
     wall, at_gaps = np.zeros(lattice.shape, np.bool_), _at_gaps(found)
-    _mark(wall, chain(_fans(found, length), _discs(found, at_gaps, length)), lattice)
+    mark_triangles(wall, chain(_fans(found, length), _discs(found, at_gaps, length)), lattice)
     where = NearPlaces(np.reshape(places, (-1, 3)), NEAR_PLACES * length)
-    body = _enclosed(wall)
+    body = enclosed_by(wall)
     if not _bounds_body(found, body, lattice, length):  # random points leave a gap anywhere
-        body = _enclosed(wall, WIDER_GAPS)
+        body = enclosed_by(wall, WIDER_GAPS)
     opened = _open_and_close(points, body, lattice, length, where)
     if opened is None and (caps := _caps(found, at_gaps, length, float(wall.sum()) * lattice.size**2)):
-        _mark(wall, caps, lattice)
-        opened = _open_and_close(points, _enclosed(wall), lattice, length, where)
+        mark_triangles(wall, caps, lattice)
+        opened = _open_and_close(points, enclosed_by(wall), lattice, length, where)
     return opened
 
 
-def _lattice(points: np.ndarray, length: float) -> _Lattice | None:
+def _lattice(points: np.ndarray, length: float) -> VoxelLattice | None:
     """Return voxels around points (N, 3); None where they would be too many."""
     margin = (LIMB_RADIUS + WIDEST_LINK + 1.0) * length
     low, extent = points.min(axis=0) - margin, np.ptp(points, axis=0) + 2.0 * margin
@@ -138,7 +128,7 @@ def _lattice(points: np.ndarray, length: float) -> _Lattice | None:
     if size > COARSEST_VOXEL * length:
         return None
     x, y, z = (np.ceil(extent / size).astype(int) + 1).tolist()
-    return _Lattice(low, size, (x, y, z))
+    return VoxelLattice(low, size, (x, y, z))
 
 
 def _fans(found: Linked, length: float) -> Iterator[np.ndarray]:
@@ -159,7 +149,7 @@ def _fans(found: Linked, length: float) -> Iterator[np.ndarray]:
         yield corners[wide < widest[closed]]
 
 
-def _bounds_body(found: Linked, enclosed: Voxels, lattice: _Lattice, length: float) -> bool:
+def _bounds_body(found: Linked, enclosed: Voxels, lattice: VoxelLattice, length: float) -> bool:
     """Whether the inside of most samples is enclosed, on one side or the other."""
     deep = LIMB_RADIUS * length * found.normals
     inside = [enclosed[tuple(np.rint(lattice.of(found.mean + side)).astype(int).T)] for side in (deep, -deep)]
@@ -227,67 +217,13 @@ def _caps(found: Linked, at_gaps: NDArray[np.bool_], length: float, area: float)
     return caps if missing < MOST_OPEN * area else []
 
 
-def _mark(wall: Voxels, triangles: Iterable[np.ndarray], lattice: _Lattice) -> None:
-    """Mark the voxels in which triangles lie, each (K, 3, 3)."""
-    for corners in map(lattice.of, triangles):
-        edge = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
-        parts = np.maximum(np.ceil(edge / WALL_STEP).astype(int), 1)
-        for count in np.unique(parts):  # places a step apart, by their shares of the corners
-            some = corners[parts == count]
-            for i in range(count + 1):
-                for j in range(count + 1 - i):
-                    share = np.array([count - i - j, i, j]) / count
-                    wall[tuple(np.rint(np.einsum("c,kci->ik", share, some)).astype(int))] = True
-
-
-def _enclosed(wall: Voxels, gap: int = 1) -> Voxels:
-    """Return the voxels that cannot be reached from outside through a wall, those of the wall included.
-
-    gap : half the width of the gaps in the wall that are closed [voxels]
-    """
-    from scipy import ndimage
-
-    free = ~ndimage.binary_dilation(wall)
-    label = ndimage.label(free if gap == 1 else ~ndimage.binary_dilation(wall, iterations=gap))[0]
-    outside = label == label[0, 0, 0]
-    for _ in range(gap - 1):
-        outside = ndimage.binary_dilation(outside, mask=free)
-    # farther from outside than 1.5 voxels: half of one, and the thickness of a wall
-    enclosed: Voxels = ~ndimage.binary_dilation(outside, ndimage.generate_binary_structure(3, 2))
-    return enclosed
-
-
-def _distance(voxels: Voxels, lattice: _Lattice, reach: float) -> DistanceField:
-    """Return the distance of each voxel from the nearest of some (X, Y, Z) [scan unit]; one beyond the reach where that is farther."""
-    far = int(np.ceil(reach / lattice.size))
-    rows, squares = np.empty(lattice.shape, np.int16), np.empty(lattice.shape, np.int16)
-    run_in_parts(lattice.shape[0], PLANES_PER_THREAD, squares_in_rows, voxels, far, rows)
-    run_in_parts(lattice.shape[0], PLANES_PER_THREAD, squares_across_rows, rows, False, far, squares)
-    run_in_parts(lattice.shape[0], PLANES_PER_THREAD, squares_across_rows, squares, True, far, rows)
-    distance: DistanceField = np.sqrt(rows, dtype=np.float64)
-    distance *= lattice.size
-    return distance
-
-
-def _beyond_ball(voxels: Voxels, radius: float, deep: float, lattice: _Lattice) -> Voxels:
-    """Return the voxels that a ball within them does not reach, where they lie deeper than corners and edges, and what is around those."""
-    reached = _distance(_distance(~voxels, lattice, radius) >= radius, lattice, radius + deep) - radius
-    beyond = voxels & (reached > 0.0)
-    far = beyond & (reached > deep)
-    if not far.any():
-        return far
-    edge = deep + 2.0 * lattice.size
-    near: Voxels = beyond & (_distance(far, lattice, edge) < edge)
-    return near
-
-
 class NearPlaces(NamedTuple):
     """Where limbs are taken off and slits filled."""
 
     places: np.ndarray  #: (K, 3) [scan unit]; everywhere where there is none
     reach: float  #: [scan unit]
 
-    def of(self, voxels: Voxels, lattice: _Lattice) -> Voxels:
+    def of(self, voxels: Voxels, lattice: VoxelLattice) -> Voxels:
         """Return the parts of some voxels (X, Y, Z) that come near a place."""
         from scipy import ndimage
         from scipy.spatial import cKDTree
@@ -311,27 +247,9 @@ def _without_walls(limbs: Voxels, body: Voxels) -> Voxels:
     for number, box in enumerate(ndimage.find_objects(part), start=1):
         around = tuple(slice(max(side.start - 1, 0), side.stop + 1) for side in box)
         own = body[around]
-        kept[number] = _euler(own & (part[around] != number)) >= _euler(own)
+        kept[number] = euler_of_voxels(own & (part[around] != number)) >= euler_of_voxels(own)
     kept[0] = False
     return np.asarray(kept[part])
-
-
-def _euler(voxels: Voxels) -> int:
-    """Return the Euler characteristic of some voxels (X, Y, Z) that hang together where they touch: parts less tunnels plus hollows."""
-    filled = np.pad(voxels, 1)
-    total = 0
-    # cells of the lattice: corners, which are wide along no axis, edges along one, sides along two, voxels along all
-    for axes in product((False, True), repeat=3):
-        cells = filled
-        for axis, wide in enumerate(axes):
-            if not wide:
-                one, other = (
-                    tuple(slice(begin, end) if each == axis else slice(None) for each in range(3))
-                    for begin, end in ((0, -1), (1, None))
-                )
-                cells = cells[one] | cells[other]
-        total += (-1) ** sum(axes) * int(cells.sum())
-    return total
 
 
 def _islands(body: Voxels, before: Voxels) -> Voxels:
@@ -350,23 +268,25 @@ def _islands(body: Voxels, before: Voxels) -> Voxels:
 
 
 def _open_and_close(
-    points: np.ndarray, body: Voxels, lattice: _Lattice, length: float, where: NearPlaces
+    points: np.ndarray, body: Voxels, lattice: VoxelLattice, length: float, where: NearPlaces
 ) -> OpenedBody | None:
     """Return what becomes of points (N, 3) around a body; None where it is all thinner than a limb, loses too much or nothing changes."""
     from scipy import ndimage
     from scipy.spatial import cKDTree
 
-    if not (_distance(~body, lattice, LIMB_RADIUS * length) >= LIMB_RADIUS * length).any():  # pockets of an open sheet
+    if not (
+        distance_from(~body, lattice, LIMB_RADIUS * length) >= LIMB_RADIUS * length
+    ).any():  # pockets of an open sheet
         return None
-    thin = where.of(_beyond_ball(body, LIMB_RADIUS * length, DEPTH_OF_LIMBS * length, lattice), lattice)
+    thin = where.of(beyond_ball(body, LIMB_RADIUS * length, DEPTH_OF_LIMBS * length, lattice), lattice)
     limbs = _without_walls(thin, body)
     body = body & ~limbs
-    slits = where.of(_beyond_ball(~body, SLIT_RADIUS * length, DEPTH_OF_LIMBS * length, lattice), lattice)
+    slits = where.of(beyond_ball(~body, SLIT_RADIUS * length, DEPTH_OF_LIMBS * length, lattice), lattice)
     islands = _islands(body | slits, body | limbs)
     limbs |= islands
     body = (body | slits) & ~islands
     reach = SURELY_BEYOND * lattice.size
-    depth = _distance(~body, lattice, reach) - _distance(body, lattice, reach)  # positive inside
+    depth = distance_from(~body, lattice, reach) - distance_from(body, lattice, reach)  # positive inside
     depth -= 0.5 * lattice.size * np.sign(depth)
     at = lattice.of(points).T
     own = ndimage.map_coordinates(depth, at, order=1)
@@ -374,28 +294,12 @@ def _open_and_close(
     slits[tuple(axis[inside] for axis in voxel)] = True  # those so narrow that the walls filled them
     slits = where.of(slits, lattice)
     slit = inside & slits[voxel]
-    changed = _distance(limbs | slits, lattice, max(length, reach))
+    changed = distance_from(limbs | slits, lattice, max(length, reach))
     near = ndimage.map_coordinates(np.minimum(changed, length), at, order=1) < 2.0 * lattice.size
     limb = near & (own < -OFF_BODY * lattice.size)
     left = ~limb & ~slit
     if left.all() or left.mean() < 1.0 - MOST_TAKEN_OFF:
         return None
-    surface = _crossings(ndimage.gaussian_filter(depth, 1.0), changed < 2.5 * lattice.size, lattice)
+    surface = crossings_of(ndimage.gaussian_filter(depth, 1.0), changed < 2.5 * lattice.size, lattice)
     bare = cKDTree(points[left]).query(surface)[0] > 0.8 * lattice.size if len(surface) else np.zeros(0, np.bool_)
     return OpenedBody(limb, slit, surface[bare])
-
-
-def _crossings(field: DistanceField, where: Voxels, lattice: _Lattice) -> np.ndarray:
-    """Return the places (M, 3) between neighbouring voxels at which a field is 0, beside some voxels."""
-    places = []
-    for axis in range(3):
-        here, there = (
-            tuple(slice(begin, end) if each == axis else slice(None) for each in range(3))
-            for begin, end in ((0, -1), (1, None))
-        )
-        one, other = field[here], field[there]
-        crosses = ((one > 0.0) != (other > 0.0)) & where[here]
-        voxel = np.argwhere(crosses).astype(float)
-        voxel[:, axis] += one[crosses] / (one[crosses] - other[crosses])
-        places.append(voxel * lattice.size + lattice.low)
-    return np.concatenate(places)
