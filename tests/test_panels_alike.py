@@ -129,8 +129,8 @@ def test_hexagons_that_are_alike_stay_as_they_are() -> None:
         1,
         0,
     ]
-    few = st.few_panels(grid_of(shaken, honeycomb().panel_table), 0.01)
-    assert len(few.counts) < 0.8 * few.before
+    few = st.few_panels(grid_of(shaken, honeycomb().panel_table), 0.01, 19)
+    assert len(few.counts) <= 19 < 0.8 * few.before
 
 
 def test_mirror_images_are_of_one_kind_where_it_is_asked_for() -> None:
@@ -156,7 +156,7 @@ def test_what_is_symmetric_stays_so_and_fewer_can_be_enough() -> None:
     found = st.few_panels(grid, 0.05)
     assert len(Images.of_grid(found.grid).matrices) == 3
     rough = uneven(6)
-    few, enough = st.few_panels(rough, 0.01), st.few_panels(rough, 0.01, 25)
+    few, enough = (st.few_panels(rough, 0.01, count) for count in (3, 25))  # 3 are the fewest that it finds
     assert len(few.counts) < len(enough.counts) <= 25 < few.before
 
 
