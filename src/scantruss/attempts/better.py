@@ -68,6 +68,21 @@ def follows_ridges_as_well(grid: Grid, other: Grid) -> bool:
     return is_even and is_near and _poor_members(found) <= _poor_members(known)
 
 
+def follows_more_edges(grid: Grid, other: Grid) -> bool:
+    """Whether a grid follows ridges for longer than another one, hardly farther from the scan or unevener, and is no poorer."""
+    found, known = grid.certificate, other.certificate
+    if found is None or known is None or found.scan_distance is None or known.scan_distance is None:
+        return False
+    lengths = [sum(each["length"] for each in sets_of(one, RIDGE)) for one in (grid, other)]
+    return (
+        lengths[0] > lengths[1]
+        and _is_near(found.scan_distance, known.scan_distance)
+        and _variation(grid) <= _variation(other) + UNEVENER_BESIDE_RIDGES
+        and _poor_members(found) <= _poor_members(known)
+        and found.missing <= known.missing + MISSING_ALIKE
+    )
+
+
 def doubts_ridges(grid: Grid, asked: Settings) -> bool:
     """Whether ridges of a grid may be none: it gives some up or breaks them off and has poor members, or they are blunt and members uneven.
 

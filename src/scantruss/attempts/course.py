@@ -9,7 +9,14 @@ from typing import TYPE_CHECKING
 
 from ..check.limits import with_ridges_given_up, with_ridges_lost
 from ..errors import CertificateError, FrontError, OneSidedError, ScanTrussError
-from .better import MISSING_ALIKE, doubts_ridges, follows_more, gaps_spanned, is_better_without_ridges
+from .better import (
+    MISSING_ALIKE,
+    doubts_ridges,
+    follows_more,
+    follows_more_edges,
+    gaps_spanned,
+    is_better_without_ridges,
+)
 from .limit import (
     AttemptLimit,
     fails_as_sparse,
@@ -49,16 +56,18 @@ if TYPE_CHECKING:
 LEAST_EFFORT = "quick"
 WITHOUT_RODS = "passes, but along rods: without them"
 BETWEEN_WALLS = "passes, but jumps between thin walls: with their sides distinguished"
+CUTS_ACROSS_EDGES = "passes, but cuts across edges: with sharp edges looked at"
 BREAKS_LIMB = "the grid is torn at a limb thinner than its members"
 RIDGES_GIVEN_UP = "ridges given up near the faults"
 WITHOUT_DOUBTFUL_RIDGES = "passes, but with ridges that may be none: without any"
 WITH_LEAST_EFFORT = "passes, but without what is taken for limbs and slits: as asked, with the least effort"
-# rows of grids that pass before the sides of walls were ever distinguished
-TRIED_BEFORE_WALLS = (AS_ASKED, RIDGES_GIVEN_UP)
+# rows of grids that pass before the sides of walls were ever distinguished, or sharp edges looked at
+TRIED_FIRST = (AS_ASKED, RIDGES_GIVEN_UP)
 
 # attempts that are made after one that passes, and when their grids are taken in its place
 IS_BETTER = {
     BETWEEN_WALLS: follows_more,
+    CUTS_ACROSS_EDGES: follows_more_edges,
     WITHOUT_DOUBTFUL_RIDGES: is_better_without_ridges,
     WITH_LEAST_EFFORT: follows_more,
 }
@@ -78,6 +87,8 @@ class AttemptCourse:
       points judged, as most may be outliers, once. None passes without.
     - `BETWEEN_WALLS`: the first grid passes but may jump between the sides of thin walls; once, as the last attempt. That which follows
       more of the scan is taken.
+    - `CUTS_ACROSS_EDGES`: a grid passes but cuts across edges of a body with sharp ones; once, as the last attempt. That is taken which
+      follows more of them, if it is no poorer and hardly farther from the scan.
     - `WITHOUT_DOUBTFUL_RIDGES`: a grid passes with ridges given up or broken off, as along a round tube, or with uneven members, as along
       bones; once, as the last attempt. It is taken where it is far evener and hardly farther from the scan.
     - `WITH_LEAST_EFFORT`: only the plain body passes, and leaves out a part of the scan; as asked with the least effort, as the last
@@ -206,16 +217,22 @@ class AttemptCourse:
             without = self._row_begun.settings.replace(keep_rods=False)
             self._follows = replace(self._row_begun, settings=without, row=WITHOUT_RODS)
             self._first_fault = None
-        elif attempt.row in TRIED_BEFORE_WALLS and jumps_between_walls(grid, self._cloud, self._settings):
+        elif attempt.row in TRIED_FIRST and jumps_between_walls(grid, self._cloud, self._settings):
             self._follows = Attempt(
                 self._settings.replace(thin_walls=True), is_trial=attempt.is_trial, row=BETWEEN_WALLS
             )
+        elif lost and attempt.row in TRIED_FIRST and not attempt.is_trial and self._has_sharp_edges():
+            self._follows = Attempt(self._settings.replace(sharp_edges=True), row=CUTS_ACROSS_EDGES)
         elif doubts_ridges(grid, self._settings) and not attempt.is_trial:
             without = attempt.settings.replace(ridge_angle=0.0)
             self._follows = Attempt(without, row=WITHOUT_DOUBTFUL_RIDGES)
         elif self._drops_parts(attempt, grid):
             self._follows = Attempt(self._settings.replace(effort=LEAST_EFFORT), row=WITH_LEAST_EFFORT)
         self._passed = grid
+
+    def _has_sharp_edges(self) -> bool:
+        """Whether the scan has sharp edges that were not asked for."""
+        return AskedScan(self._cloud, self._settings).has_sharp_edges
 
     def _drops_parts(self, attempt: Attempt, grid: Grid) -> bool:
         """Whether a grid that passes leaves out a part of the scan that one with less effort may follow."""
@@ -231,7 +248,7 @@ class AttemptCourse:
         ScanTrussError
             The fault, where it is one of the settings that were asked for.
         """
-        if attempt.row == WITHOUT_DOUBTFUL_RIDGES:
+        if attempt.row in (WITHOUT_DOUBTFUL_RIDGES, CUTS_ACROSS_EDGES):
             return
         if attempt.row == WITH_LEAST_EFFORT:
             self._follows = attempt.after(fault, self._cloud) if isinstance(fault, FrontError) else None

@@ -23,7 +23,6 @@ from .lines_of_folds import (
     SHARPEST_EDGE,
     SHARPEST_FOLD_ANGLE,
     SHARPEST_LIP,
-    TURNS_BACK,
     WIDE_UNEVEN,
     is_clear_on_rough,
     is_even,
@@ -158,7 +157,7 @@ class Tracer:
         for fold in some:
             sample = nearest_sample(self.surface, *fold.place.tolist())
             lip = self.fold_at(sample, fold.place, fold.ahead)
-            if lip is not None and lip.bend >= TURNS_BACK:
+            if lip is not None and lip.bend >= np.radians(self.sharpest):
                 beside += bool(np.linalg.norm(lip.place - fold.place) < HALF_NARROW_LIP * self.length)
         return 2 * beside > len(some)
 

@@ -50,12 +50,12 @@ class FoldLines:
     @cached_property
     def lips(self) -> list[np.ndarray]:
         """The lips of thin bodies, each (K,) FOLD: one line stands for both of their edges."""
-        return [folds for folds in self._all_wide if is_lip(folds) and is_made(folds) and not self._has_edges(folds)]
+        return [folds for folds in self._all_wide if self._is_made_lip(folds) and not self._has_edges(folds)]
 
     @cached_property
     def wide(self) -> list[np.ndarray]:
         """Other folds that turn over nearly a member, each (K,) FOLD."""
-        return [folds for folds in self._all_wide if not (is_lip(folds) and is_made(folds))]
+        return [folds for folds in self._all_wide if not self._is_made_lip(folds)]
 
     def ridges(self, numbers: tuple[int, ...]) -> tuple[Ridge, ...]:
         """The ridges along the narrow lines and along some of the wide ones; see `find_ridges`."""
@@ -75,7 +75,7 @@ class FoldLines:
                 folds["place"],
                 is_sharp(folds, tracer.angle),
                 acute=bool(np.median(folds["bend"]) >= ACUTE_RIDGE),
-                lip=is_lip(folds),
+                lip=is_lip(folds, tracer.sharpest),
             )
             for folds in traced
         ]
@@ -85,6 +85,10 @@ class FoldLines:
             for ridge in ridges + short_ridges(ridges, tracer)
         ]
         return tuple(sorted(ridges, key=lambda ridge: (ridge.ring, -len(ridge.places))))
+
+    def _is_made_lip(self, folds: np.ndarray) -> bool:
+        """Whether wide folds (K,) FOLD are the lip of a body that was made."""
+        return is_lip(folds, self._tracer.sharpest) and is_made(folds)
 
     def _has_edges(self, lip: np.ndarray) -> bool:
         """Whether a lip (K,) FOLD is so wide that its edges are ridges of their own along most of it."""
@@ -96,7 +100,7 @@ class FoldLines:
         """Whether a narrow line (K,) FOLD runs along wide ones and says less than they do."""
         if not runs_along(folds, wide, self.length):
             return False
-        lips = [each for each in wide if is_lip(each)]
+        lips = [each for each in wide if is_lip(each, self._tracer.sharpest)]
         return not is_sure(folds, self._tracer.angle) or runs_along(folds, lips, 2.0 * HALF_NARROW_LIP * self.length)
 
 
