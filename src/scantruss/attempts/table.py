@@ -34,6 +34,7 @@ AS_ASKED, WITHOUT_ROWS, ROWS_TURNED, PLAIN_BODY = "as asked", "front without row
 FRONT_LENGTHS = (1.0, 0.97, 1.04)
 TURNED_ROWS = (40.0, 10.0, 50.0)  # angles of the lattice that are tried instead of the usual one [degree]
 COARSER_SAMPLES = (1.1, 1.2, 1.3)  # distances of the surface samples that are tried instead, in those of the settings
+FINER_SAMPLES = 0.6  # the same at sharp edges, near which the two sides of a body are as near to each other as samples
 COARSEST_SAMPLES = 0.5  # largest of them, in desired lengths
 SMOOTHING_SCALES = (
     0.5,
@@ -221,6 +222,10 @@ ROWS_TRIED: tuple[AttemptRow, ...] = (
     AttemptRow(ROWS_TURNED, TURNED_ROWS, lambda scan, now: has_one_lattice(scan.cloud, now)),
     # where edges, limbs or slits are in the way, other fronts seldom help
     AttemptRow("sharp edges", FIRST_LAYOUT, lambda scan, now: scan.has_sharp_edges, {"sharp_edges": True}),
+    AttemptRow(
+        "sharp edges, finer samples", FIRST_LAYOUT,
+        lambda scan, now: scan.has_sharp_edges, {"sharp_edges": True}, {"box_size": FINER_SAMPLES},
+    ),
     AttemptRow("narrow gaps", FIRST_LAYOUT, lambda scan, now: scan.has_narrow_gaps, {"thin_walls": True}),
     AttemptRow(PLAIN_BODY, FIRST_LAYOUT, lambda scan, now: scan.has_plain_body, {"plain_body": True}),
     AttemptRow("fronts of other lengths", LATER_LAYOUTS),
