@@ -34,8 +34,9 @@ AS_ASKED, WITHOUT_ROWS, ROWS_TURNED, PLAIN_BODY = "as asked", "front without row
 FRONT_LENGTHS = (1.0, 0.97, 1.04)
 TURNED_ROWS = (40.0, 10.0, 50.0)  # angles of the lattice that are tried instead of the usual one [degree]
 COARSER_SAMPLES = (1.1, 1.2, 1.3)  # distances of the surface samples that are tried instead, in those of the settings
-FINER_SAMPLES = 0.6  # the same at sharp edges, near which the two sides of a body are as near to each other as samples
 COARSEST_SAMPLES = 0.5  # largest of them, in desired lengths
+# distance of the samples that is tried at sharp edges, where two sides are near each other, in that of the settings
+FINER_SAMPLES = 0.6
 SMOOTHING_SCALES = (
     0.5,
     1.0,

@@ -18,9 +18,8 @@ LEAST_ROUGH_RIDGE = 6.0  # least length of a line of folds on a rough scan [memb
 # share of the ridge angle by which half of such a line is folded at least, where it is not sure and longer
 ROUGH_SHARE = 1.4
 LEAST_SURE_ROUGH = 12.0  # least length of a sure line there that is folded by less [member lengths]
-TURNS_BACK = np.radians(
-    125.0
-)  # bend of a wide fold from which on it is a lip, unless sharp edges of bodies are looked for
+# bend of a wide fold from which on it is a lip, unless sharp edges of bodies are looked for
+TURNS_BACK = np.radians(125.0)
 PLACES_OF_TURN = 3  # places on both sides from which the turn of a line is taken
 CORNER_TURN = 25.0  # by how much a line turns more in a corner than before and after it [degree]
 SHORTEST_LINE_OF_FOLDS = 1.0  # least length of a line of folds [member lengths]

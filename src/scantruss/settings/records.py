@@ -211,8 +211,8 @@ class SurfaceSettings(_Checked):
     )
     sharp_edges: bool = _setting(
         False,
-        "look for edges at which two sides of a body meet at less than about 60 degrees; tried automatically if no grid passes"
-        " (default method only)",
+        "look for edges at which two sides of a body meet at less than about 60 degrees; tried automatically if no grid passes,"
+        " or one that cuts across edges (default method only)",
     )
     thin_walls: bool = _setting(
         False,
