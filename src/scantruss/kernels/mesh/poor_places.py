@@ -7,7 +7,7 @@ import numpy as np
 from ...runtime.jit import kernel
 from ..geometry.vectors import Vector, cross, norm, row, subtract
 from .figures import angle_between
-from .grid import Net, target_length, wings
+from .grid import Net, list_triangles, target_length, wings
 
 
 @kernel
@@ -38,28 +38,22 @@ def faults_of_triangles(
     shortest, longest : lengths of members [desired length]
     narrowest, flattest : angle of a triangle, and between two triangles [degree]
     """
-    nodes, count = net.nodes, 0
-    for v in range(net.in_use[0]):
-        d = net.degree[v]
-        for i in range(d - net.is_open[v]):
-            u, w = net.ring[v, i], net.ring[v, (i + 1) % d]
-            if u < v or w < v:
-                continue
-            triangles[count, 0], triangles[count, 1], triangles[count, 2] = v, u, w
-            held = fixed[v] and fixed[u] and fixed[w]
-            normal = cross(subtract(row(nodes, u), row(nodes, v)), subtract(row(nodes, w), row(nodes, v)))
-            found = 0.0
-            for a, b, c in ((v, u, w), (u, w, v), (w, v, u)):
-                start = row(nodes, a)
-                if not (fixed[a] and fixed[b]):
-                    size = norm(subtract(row(nodes, b), start)) / target_length(net, a, b, length)
-                    found += max(1.0 - size / shortest, size / longest - 1.0, 0.0)
-                if not held:
-                    angle = angle_between(subtract(row(nodes, b), start), subtract(row(nodes, c), start))
-                    found += max(1.0 - angle / narrowest, 0.0)
-                two, other = normal_beyond(net, a, b)
-                if two:
-                    found += max(1.0 - (180.0 - angle_between(normal, other)) / flattest, 0.0)
-            faults[count] = found
-            count += 1
+    nodes, count = net.nodes, list_triangles(net, triangles)
+    for t in range(count):
+        v, u, w = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        held = fixed[v] and fixed[u] and fixed[w]
+        normal = cross(subtract(row(nodes, u), row(nodes, v)), subtract(row(nodes, w), row(nodes, v)))
+        found = 0.0
+        for a, b, c in ((v, u, w), (u, w, v), (w, v, u)):
+            start = row(nodes, a)
+            if not (fixed[a] and fixed[b]):
+                size = norm(subtract(row(nodes, b), start)) / target_length(net, a, b, length)
+                found += max(1.0 - size / shortest, size / longest - 1.0, 0.0)
+            if not held:
+                angle = angle_between(subtract(row(nodes, b), start), subtract(row(nodes, c), start))
+                found += max(1.0 - angle / narrowest, 0.0)
+            two, other = normal_beyond(net, a, b)
+            if two:
+                found += max(1.0 - (180.0 - angle_between(normal, other)) / flattest, 0.0)
+        faults[t] = found
     return count
