@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import naive
 import numpy as np
 import pytest
 from marks import compiled_only
@@ -96,18 +97,10 @@ def test_all_edges_of_a_pyramid_are_chains(seed: int) -> None:
     assert sum(each.length(grid) for each in grid.line_sets) == pytest.approx(whole, rel=0.03)
     nodes = grid.nodes + grid.origin
     on_edges = nodes[np.unique(np.concatenate([each.nodes for each in grid.line_sets]))]
-    off = np.min([distance_from_segment(on_edges, corners[a], corners[b]) for a, b in ends], axis=0)
+    off = np.array([min(naive.distance_to_segment(node, corners[a], corners[b]) for a, b in ends) for node in on_edges])
     assert off.mean() < 0.03 * 0.18 and off.max() < 0.12 * 0.18
     assert grid.certificate is not None and grid.certificate.scan_distance is not None
     assert grid.certificate.scan_distance.p95 < 0.04 * 0.18
-
-
-def distance_from_segment(
-    points: NDArray[np.float64], a: NDArray[np.float64], b: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """How far points (K, 3) lie from the straight way from a to b (K,)."""
-    along = np.clip((points - a) @ (b - a) / ((b - a) @ (b - a)), 0.0, 1.0)
-    return np.asarray(np.linalg.norm(points - a - along[:, None] * (b - a), axis=1))
 
 
 def test_a_grid_along_more_edges_is_taken_where_it_is_as_near_and_as_even() -> None:
