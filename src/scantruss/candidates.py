@@ -11,8 +11,9 @@ from .attempts.looks import VERY_ROUGH_SCAN
 from .errors import CertificateError, FrontError
 from .front.advance import advance_front
 from .front.orientation_field import Field, FieldStart, orientation_fields
-from .improve.candidate import Candidate, grid_of, judged, misses_at_most
-from .improve.longer_search import is_no_worse, search_on, unevenness
+from .improve.candidate import Candidate, grid_of, judged, misses_at_most, unevenness
+from .improve.fit import take_fit
+from .improve.longer_search import is_no_worse, search_on
 from .improve.optimize import improve_first, improve_last
 from .improve.tip_search import MOST_MISSED, end_with_tips
 from .runtime.parallel import threaded_map
@@ -118,6 +119,9 @@ def best_that_passes(
 ) -> Grid:
     """Improve the first candidates to the end, check them, and return the best that passes, with its certificate.
 
+    Its nodes are still to be fitted to the scan (`Grid.fit`), after all comparisons with grids of other attempts: a fitted one comes nearer
+    to folds that it cuts across. One of effort `best`, which is fitted as it is searched, is compared as that of `normal`.
+
     is_trial : a grid that passes is left as it is, without nodes on the tips of the scan
     starts : how their fronts were laid out, if not as usual
 
@@ -129,7 +133,16 @@ def best_that_passes(
     if settings.effort == "best" and settings.method == "default":
         return no_worse(candidates, samples, boundary, constraints, settings, starts, progress=progress)
     passed = those_that_pass(candidates, samples, boundary, constraints, settings, is_trial=is_trial, progress=progress)
-    return grid_of(chosen(passed))
+    best = chosen(passed)
+    if is_trial or settings.effort == "quick" or settings.method == "paper":
+        return grid_of(best)
+
+    def fit(grid: Grid) -> Grid:
+        before = grid_of(best)
+        take_fit(best, samples, boundary, constraints, settings)
+        return with_warnings_of(grid, before, grid_of(best))
+
+    return grid_of(best).replace(fit=fit)
 
 
 def those_that_pass(
@@ -204,14 +217,34 @@ def no_worse(
     fronts = advance_fronts(samples, boundary, constraints, fields, lower)
     improved = improve_fronts(fronts, samples, boundary, constraints, lower)
     usual = chosen(those_that_pass(improved, samples, boundary, constraints, lower))
+    compared = grid_of(usual)
+    take_fit(usual, samples, boundary, constraints, lower)
     passed: list[Candidate] = []
     with suppress(FrontError):
         passed = those_that_pass(candidates, samples, boundary, constraints, settings, progress=progress)
+    for each in passed:
+        take_fit(each, samples, boundary, constraints, settings)
     better = [each for each in passed if is_no_worse(grid_of(each), grid_of(usual))]
     best = chosen(better) if better else usual
     if best.mesh.sharp.any() or not better:  # elsewhere its own search leaves little
         best = searched_on(best, usual, passed, samples, boundary, constraints, lower)
-    return grid_of(best).replace(settings=settings)
+    return compared.replace(settings=settings, fit=lambda grid: with_warnings_of(grid, compared, grid_of(best)))
+
+
+def fitted_at_last(grid: Grid) -> Grid:
+    """Return a grid whose nodes are fitted to the scan, if they are still to be."""
+    return grid if grid.fit is None else grid.fit(grid)
+
+
+def with_warnings_of(grid: Grid, before: Grid, fitted: Grid) -> Grid:
+    """Return a fitted grid with the settings of the grid it was, and with what was said of that since."""
+    now, then, found = grid.certificate, before.certificate, fitted.certificate
+    assert now is not None
+    assert then is not None
+    assert found is not None
+    said = tuple(each for each in now.warnings if each not in then.warnings)
+    whole = replace(found, warnings=(*found.warnings, *said))
+    return fitted.replace(settings=grid.settings, certificate=whole, fit=None)
 
 
 def searched_on(
@@ -275,7 +308,7 @@ def optimize_fronts(
     """
     improved = improve_fronts(fronts, samples, boundary, constraints, settings, progress=progress)
     try:
-        return best_that_passes(improved, samples, boundary, constraints, settings, progress=progress)
+        return fitted_at_last(best_that_passes(improved, samples, boundary, constraints, settings, progress=progress))
     except CertificateError as refused:
         raise refused.whole from None
 

@@ -16,7 +16,7 @@ from .attempts.course import AttemptCourse
 from .attempts.limit import AttemptLimit
 from .attempts.table import AS_ASKED, Attempt, places_of_fault
 from .boundary.find import find_boundary
-from .candidates import advance_fronts, best_that_passes, improve_fronts
+from .candidates import advance_fronts, best_that_passes, fitted_at_last, improve_fronts
 from .cells.make import settings_of_triangles, with_cells
 from .cells.symmetric_grids import symmetric_grid, symmetric_hexagons
 from .check.unfollowed import crests_cut_off
@@ -121,7 +121,7 @@ def grid_from_cloud(
         grid = symmetric(cloud, settings, part_of, progress=watch, keep_failed=keep_failed)
         return facing_up(grid, cloud).replace(seconds=watch.seconds())
     try:
-        grid = first_that_passes(cloud, settings, progress=watch)
+        grid = fitted_at_last(first_that_passes(cloud, settings, progress=watch))
     except CertificateError as refused:
         if not keep_failed or not len(refused.grid.triangles):
             raise

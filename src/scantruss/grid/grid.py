@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from importlib import import_module
@@ -34,6 +35,7 @@ PROVENANCE = {
     "certificate",
     "alike",
     "seconds",
+    "fit",
     "line_sets",
 }  # fields that no figure of a grid depends on
 OF_TRIANGLES = {  # what follows from the triangles alone
@@ -67,6 +69,8 @@ class Grid(GridTables):
     certificate: Certificate | None = None  #: what was checked against the scan
     alike: Alike | None = None  #: which of its parts were made alike
     seconds: dict[str, float] = field(default_factory=dict)  #: time of each stage [s]; never written with the grid
+    #: fits the nodes to the scan, which is still to be done; None for every grid that is returned
+    fit: Callable[[Grid], Grid] | None = field(default=None, compare=False)
 
     def __repr__(self) -> str:
         """Say what it is made of, not every number."""
@@ -90,7 +94,7 @@ class Grid(GridTables):
         What has been measured goes along where it is the same.
         """
         if not changes.keys().isdisjoint(("nodes", "triangles", "fixed", "origin")):
-            changes = {"certificate": None, "alike": None, **changes}
+            changes = {"certificate": None, "alike": None, "fit": None, **changes}
         if "triangles" in changes:
             changes = {"panels": None, **changes}
         copy = replace(self, **changes)

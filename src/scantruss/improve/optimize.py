@@ -20,7 +20,7 @@ from .off_scan import put_on_scan
 from .perturbation import LONGER, Spared, search_widely
 from .sliding_nodes import with_boundary_members, with_line_sets
 from .smoothing import smooth
-from .working_mesh import WorkingMesh
+from .working_mesh import Closed, WorkingMesh
 
 if TYPE_CHECKING:
     from ..boundary.find import Boundary
@@ -164,15 +164,22 @@ def put_down(
         if settings.method == "default":
             put_on_scan(mesh, samples, settings)
 
-    closed, before, _ = side_by_side(lambda: mesh.close(front), lambda: front.quality, come_to_rest)
+    closed, _, _ = side_by_side(lambda: mesh.close(front), lambda: front.quality, come_to_rest)
     for _ in range(TIMES_MENDED if settings.method == "default" else 0):
         if not mend_poor_places(mesh, settings):
             break
         come_to_rest()
         closed = mesh.close(front)
+    return closed_grid(mesh, front, constraints, settings, closed)
+
+
+def closed_grid(
+    mesh: WorkingMesh, front: Grid, constraints: Constraints, settings: Settings, closed: Closed | None = None
+) -> Grid:
+    """Return a mesh as a grid, with the members and nodes on its lines; `closed`, if it was closed already."""
     grid = with_boundary_members(mesh.to_grid(front, closed), constraints.lines, settings.length)
     grid = with_line_sets(grid, constraints.lines, settings.length)
-    return grid.replace(settings=settings, before=before)
+    return grid.replace(settings=settings, before=front.quality)
 
 
 def project_onto_scan(mesh: WorkingMesh, samples: SurfaceSamples, *, boundary: bool) -> None:

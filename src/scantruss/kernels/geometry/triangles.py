@@ -96,11 +96,18 @@ def inside_triangle(
 
 
 @kernel
+def share_on_segment(p: Vector, a: Vector, b: Vector) -> float:
+    """Share of b in the place of the segment ab that is nearest to p, 0 to 1."""
+    ab = subtract(b, a)
+    square = dot(ab, ab)
+    return min(max(dot(subtract(p, a), ab) / square, 0.0), 1.0) if square > 0.0 else 0.0
+
+
+@kernel
 def distance_to_segment(p: Vector, a: Vector, b: Vector) -> float:
     """Distance of a place from the segment ab."""
     ab, ap = subtract(b, a), subtract(p, a)
-    square = dot(ab, ab)
-    t = min(max(dot(ap, ab) / square, 0.0), 1.0) if square > 0.0 else 0.0
+    t = share_on_segment(p, a, b)
     return norm((ap[0] - t * ab[0], ap[1] - t * ab[1], ap[2] - t * ab[2]))
 
 
@@ -123,6 +130,25 @@ def distance_to_triangle(p: Vector, a: Vector, b: Vector, c: Vector) -> float:
         if second >= 0.0 and third >= 0.0 and second + third <= square:
             return abs(dot(ap, normal)) / math.sqrt(square)
     return min(distance_to_segment(p, a, b), distance_to_segment(p, b, c), distance_to_segment(p, c, a))
+
+
+@kernel
+def foot_on_triangle(p: Vector, a: Vector, b: Vector, c: Vector) -> Vector:
+    """Shares of the corners in the place of the triangle abc that is nearest to p; they are 0 or more and add up to 1."""
+    ab, ac, ap = subtract(b, a), subtract(c, a), subtract(p, a)
+    normal = cross(ab, ac)
+    square = dot(normal, normal)
+    if square > 0.0:
+        second, third = dot(cross(ap, ac), normal) / square, dot(cross(ab, ap), normal) / square
+        if second >= 0.0 and third >= 0.0 and second + third <= 1.0:
+            return 1.0 - second - third, second, third
+    t, u, v = share_on_segment(p, a, b), share_on_segment(p, b, c), share_on_segment(p, c, a)
+    first, second, third = distance_to_segment(p, a, b), distance_to_segment(p, b, c), distance_to_segment(p, c, a)
+    if first <= second and first <= third:
+        return 1.0 - t, t, 0.0
+    if second <= third:
+        return 0.0, 1.0 - u, u
+    return v, 0.0, 1.0 - v
 
 
 @kernel
