@@ -11,9 +11,9 @@ from .attempts.looks import VERY_ROUGH_SCAN
 from .errors import CertificateError, FrontError
 from .front.advance import advance_front
 from .front.orientation_field import Field, FieldStart, orientation_fields
-from .improve.candidate import Candidate, grid_of, judged, misses_at_most, unevenness
+from .improve.candidate import Candidate, grid_of, judged, misses_at_most
 from .improve.fit import take_fit
-from .improve.longer_search import is_no_worse, search_on
+from .improve.longer_search import is_no_worse, search_on, unevenness
 from .improve.optimize import improve_first, improve_last
 from .improve.tip_search import MOST_MISSED, end_with_tips
 from .runtime.parallel import threaded_map

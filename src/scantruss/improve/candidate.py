@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 
 # energy a node of the share of the scan that is missed, of its distance at 95 %, and at 99 % where tips count [members]
 MISSING_ENERGY, DISTANCE_ENERGY, TIPS_ENERGY = 4.0, 0.1, 0.3
-FAR_UNEVENNESS = 0.1  # share of the distance of the scan at 99 % [member lengths] that counts as uneven
 POOR_SHAPE = 0.4  # shape quality of its worst triangle below which a grid is poor: more finalists are tried
 
 
@@ -106,10 +105,3 @@ def grid_of(candidate: Candidate) -> Grid:
     """Return the grid of a candidate that passes."""
     assert candidate.grid is not None
     return candidate.grid
-
-
-def unevenness(grid: Grid, length: float) -> float:
-    """Return the variation of the lengths, and a share of the distance of the scan from a grid at 99 %: of grids as even the nearer."""
-    found = grid.certificate
-    away = found.scan_distance.p99 / length if found is not None and found.scan_distance is not None else 0.0
-    return grid.quality.length_cv + FAR_UNEVENNESS * float(away)

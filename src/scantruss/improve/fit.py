@@ -23,7 +23,8 @@ from ..check.limits import NOISES_OFF, WARN_OFFSET
 from ..errors import CertificateError
 from ..kernels.mesh.fit import Planes, Pull, put_feet_of_samples, put_planes, settle_to_fit
 from ..kernels.mesh.grid import AT_REST, INTERIOR, ON_CURVE, is_line
-from .candidate import Candidate, judged, unevenness
+from ..surface.chosen_samples import KEPT
+from .candidate import Candidate, judged
 from .equalize import LAST_LENGTH_WEIGHT
 from .optimize import closed_grid
 from .perturbation import Spared
@@ -38,7 +39,11 @@ if TYPE_CHECKING:
     from .working_mesh import Closed, WorkingMesh
 
 ROUNDS_OF_FIT, SWEEPS_OF_FIT = 4, 6  # times that samples are assigned to triangles anew, and sweeps after each
-FITTED_FROM = 0.1  # distance of the scan from a grid at 99 % from which on it is fitted [member lengths]
+FITTED_FROM = (
+    0.15  # distance of the scan from a grid at 99 %, its noise aside, from which on it is fitted [member lengths]
+)
+# what it is worth that nodes leave the scan: by how much the lengths must vary less, or the scan be nearer at 99 % [member lengths]
+WORTH_EVENER, WORTH_NEARER = 0.005, 0.03
 FARTHEST_DRAWING = 0.6  # distance of a sample from its triangle beyond which it draws no node [member lengths]
 FACES_ITS_TRIANGLE = -0.2  # cosine between the normals of a sample and its triangle below which that is another side
 SHARE_OF_POOR = 0.9  # share of the distance from the scan that is poor, or the largest allowed, to which nodes go
@@ -77,8 +82,7 @@ def take_fit(
     """Fit the grid of a candidate that passes to the scan, and take that with its whole certificate if it is better and passes too."""
     before, whole = candidate.judged, candidate.grid
     assert before is not None
-    found = before.certificate.scan_distance
-    if found is None or found.p99 < FITTED_FROM * settings.length:
+    if not _is_far(before):
         return
     for weights in WEIGHTS_TRIED:
         fit, now = best_fit(candidate, weights, samples, boundary, constraints, settings)
@@ -93,6 +97,15 @@ def take_fit(
         except CertificateError:  # nothing but the whole certificate tells
             candidate.judged, candidate.grid = before, whole
         return
+
+
+def _is_far(before: Judged) -> bool:
+    """Whether the scan bends so much within members that some of it is far from a grid; outliers and noise do not count."""
+    found, samples = before.found, before.samples
+    if found is None:
+        return False
+    away = float(np.quantile(found.scan[samples.judged == KEPT], 0.99)) - NOISES_OFF * float(np.nanmedian(found.noise))
+    return away >= FITTED_FROM * before.settings.length
 
 
 def best_fit(
@@ -118,18 +131,15 @@ def best_fit(
 
 
 def is_better(now: Judged, before: Judged) -> bool:
-    """Whether a fitted grid has no more warnings, and is more even or nearer to the scan, and hardly worse in anything."""
-    one, other = now.certificate, before.certificate
-    if len(one.warnings) > len(other.warnings) or one.scan_distance is None or other.scan_distance is None:
+    """Whether a fitted grid is so much more even, or nearer to the scan, that it is worth it, hardly worse in anything and no poorer."""
+    one, other = now.certificate.scan_distance, before.certificate.scan_distance
+    if len(now.certificate.warnings) > len(before.certificate.warnings) or one is None or other is None:
         return False
-    most = FARTHER_IF_EVENER * now.settings.length
-    is_near = (
-        one.scan_distance.p95 <= other.scan_distance.p95 + most
-        and one.scan_distance.p99 <= other.scan_distance.p99 + most
-    )
     had, has, length = before.grid.quality, now.grid.quality, now.settings.length
+    is_near = max(one.p95 - other.p95, one.p99 - other.p99) <= FARTHER_IF_EVENER * length
     is_even = has.length_cv <= had.length_cv + MORE_UNEVEN and has.shape_mean >= had.shape_mean - LESS_REGULAR
-    return is_near and is_even and unevenness(now.checked_grid, length) < unevenness(before.checked_grid, length)
+    is_worth_it = had.length_cv - has.length_cv >= WORTH_EVENER or other.p99 - one.p99 >= WORTH_NEARER * length
+    return is_near and is_even and is_worth_it
 
 
 def fitted(

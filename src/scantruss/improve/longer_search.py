@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..check.distances import distances_to_grid
-from .candidate import Candidate, grid_of, judged, unevenness
+from .candidate import Candidate, grid_of, judged
 from .fit import fitted
 from .optimize import searched_again
 from .perturbation import LONGER, Spared
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 FREE_TURNS, SPARING_TURNS = 18, 18  # times that a grid is searched again, and again where places are spared
 LEAST_EVENED = 0.001  # fall of `unevenness` that is worth another grid
+FAR_UNEVENNESS = 0.1  # share of the distance of the scan at 99 % [member lengths] that counts as uneven
 MISSED_MORE = 0.002  # share of the scan that the grid of a longer search may miss beyond that of a shorter one
 LEAST_FARTHER = 0.05  # by how much farther from the grid than before a place of the scan is lost [member lengths]
 # distance from a fault, and from a place that was lost, within which no later turn begins [member lengths]
@@ -98,6 +99,13 @@ def _is_no_poorer(now: Judged, first: Judged, least: Grid) -> bool:
     found = now.grid.quality
     as_even = found.length_cv <= least.quality.length_cv and found.shape_mean >= least.quality.shape_mean
     return as_few and as_even and found.shape_min >= LEAST_OF_WORST * first.grid.quality.shape_min
+
+
+def unevenness(grid: Grid, length: float) -> float:
+    """Return the variation of the lengths, and a share of the distance of the scan from a grid at 99 %: of grids as even the nearer."""
+    found = grid.certificate
+    away = found.scan_distance.p99 / length if found is not None and found.scan_distance is not None else 0.0
+    return grid.quality.length_cv + FAR_UNEVENNESS * float(away)
 
 
 def is_as_near(grid: Grid, other: Grid) -> bool:
