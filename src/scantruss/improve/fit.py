@@ -48,7 +48,7 @@ FARTHEST_DRAWING = 0.6  # distance of a sample from its triangle beyond which it
 FACES_ITS_TRIANGLE = -0.2  # cosine between the normals of a sample and its triangle below which that is another side
 SHARE_OF_POOR = 0.9  # share of the distance from the scan that is poor, or the largest allowed, to which nodes go
 # a ridge is sharp from which the samples beside it lie no farther, as rms, or from which they lie farther by so much once it was fitted
-NEAR_SHARP, FARTHER_AT_SHARP = 0.03, 0.005  # [member lengths]
+NEAR_SHARP, FARTHER_AT_SHARP = 0.03, 0.01  # [member lengths]
 HELD_AT_FAULT = 2.0  # distance from a fault within which nodes stay [member lengths]
 TIMES_HELD = 3  # times that the fit is made at most, as nodes at faults and on sharp ridges stay
 AREA_OF_NODE = 0.866  # of a regular grid [member length^2]
