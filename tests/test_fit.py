@@ -38,6 +38,12 @@ def unfitted(cloud: st.PointCloud, settings: st.Settings, monkeypatch: pytest.Mo
         return st.grid_from_points(cloud, settings)
 
 
+def fit_always(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fit every grid that may be, whether it is worth it or not."""
+    monkeypatch.setattr(fit, "FITTED_FROM", -np.inf)
+    monkeypatch.setattr(fit, "is_better", lambda *_: True)
+
+
 def opened(rough: Rough) -> tuple[WorkingMesh, SurfaceSamples]:
     """A rough grid at rest on its scan, and the samples of that."""
     samples, mesh = sample_surface(rough.cloud, rough.settings), rough.mesh()
@@ -185,7 +191,9 @@ def test_no_grid_is_fitted_with_the_least_effort_or_by_the_paper(
     settings: dict[str, str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     asked = st.Settings(length=5.3, **settings)  # type: ignore[arg-type]
-    grid, plain = st.grid_from_points(box(2.4), asked), unfitted(box(2.4), asked, monkeypatch)
+    plain = unfitted(box(2.4), asked, monkeypatch)
+    fit_always(monkeypatch)
+    grid = st.grid_from_points(box(2.4), asked)
     assert (grid.nodes == plain.nodes).all()
 
 
@@ -197,10 +205,8 @@ def test_a_sharp_edge_keeps_its_nodes(monkeypatch: pytest.MonkeyPatch) -> None:
     places[np.arange(30_000), rng.integers(0, 3, 30_000)] = HALF * rng.choice(CORNERS, 30_000)
     cloud, settings = st.PointCloud.from_array(places), st.Settings(length=7.3)
     plain = unfitted(cloud, settings, monkeypatch)
-    with monkeypatch.context() as patch:
-        patch.setattr(fit, "FITTED_FROM", 0.0)
-        patch.setattr(fit, "is_better", lambda *_: True)
-        grid = st.grid_from_points(cloud, settings)
+    fit_always(monkeypatch)
+    grid = st.grid_from_points(cloud, settings)
     assert not np.array_equal(grid.nodes, plain.nodes)
 
     def off_edges(of: st.Grid) -> float:
@@ -222,7 +228,10 @@ def test_fixed_nodes_and_lines_stay(monkeypatch: pytest.MonkeyPatch) -> None:
     line = ((0.0, -12.0, HALF), (0.0, 12.0, HALF))
     fixed = ((HALF, 3.0, 3.0),)
     settings = st.Settings(length=5.3, fixed_lines=(line,), fixed=fixed)
+    plain = st.grid_from_points(box(2.4), settings)
+    fit_always(monkeypatch)
     grid = st.grid_from_points(box(2.4), settings)
+    assert not np.array_equal(grid.nodes, plain.nodes)
     assert np.linalg.norm(grid.nodes[grid.fixed] + grid.origin - np.array(fixed[0]), axis=1).min() < 1e-6
     (own,) = (each for each in grid.line_sets if each.kind != RIDGE)
     on_line = grid.nodes[own.nodes] + grid.origin
