@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import combinations, pairwise, product
+from itertools import pairwise, product
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, Never, cast
@@ -20,21 +20,11 @@ import scantruss as st
 from scantruss import candidates, pipeline
 from scantruss.attempts.limit import MOST_RUNS, AttemptLimit
 from scantruss.attempts.table import FRONT_LENGTHS, SMOOTHING_SCALES, Attempt, attempts
-from scantruss.boundary.find import find_boundary
 from scantruss.check.certify import Judged, judge
-from scantruss.constraints.find import find_constraints
 from scantruss.errors import CertificateError, FrontError
-from scantruss.front.orientation_field import orientation_fields
-from scantruss.grid.certificate import Fault
-from scantruss.improve.candidate import Candidate
-from scantruss.improve.candidate import grid_of as grid_of_candidate
-from scantruss.improve.longer_search import FREE_TURNS, SPARED_AT_FAULT, SPARING_TURNS, search_on
-from scantruss.improve.optimize import improve_last, searched_again
-from scantruss.improve.working_mesh import WorkingMesh
-from scantruss.kernels.mesh.grid import AT_REST
+from scantruss.improve.optimize import improve_last
 from scantruss.runtime import parallel
 from scantruss.scan.formats.writing import write_points
-from scantruss.surface.samples import sample_surface
 
 
 @pytest.fixture(scope="module")
@@ -320,96 +310,6 @@ def test_best_is_no_worse_than_normal_and_takes_part_only_where_that_passes(
     assert grid.settings == settings and known(grid.certificate).passed
     assert grid.quality.length_cv <= usual.quality.length_cv and grid.quality.shape_mean >= usual.quality.shape_mean
     assert found.p95 <= theirs.p95 and found.p99 <= theirs.p99
-
-
-@compiled_only
-def test_a_grid_with_ridges_is_searched_on_and_is_in_no_figure_worse() -> None:
-    gable = make("gable", 20_000)
-    settings = st.Settings(length=1.5 * gable.length)
-    samples, boundary = find_boundary(sample_surface(st.PointCloud.from_array(gable.points), settings), settings)
-    boundary, constraints = find_constraints(samples, boundary, settings)
-    fields = orientation_fields(samples, boundary, settings)
-    fronts = candidates.advance_fronts(samples, boundary, constraints, fields, settings)
-    improved = candidates.improve_fronts(fronts, samples, boundary, constraints, settings)
-    best = candidates.chosen(candidates.those_that_pass(improved, samples, boundary, constraints, settings))
-    usual = grid_of_candidate(best)
-    search_on(best, samples, boundary, constraints, settings, known(best.judged))
-    even = grid_of_candidate(best)
-    theirs, found = (known(known(grid.certificate).scan_distance) for grid in (usual, even))
-    assert len(even.lines) > 0 and known(even.certificate).passed
-    assert even.quality.length_cv < usual.quality.length_cv and even.quality.shape_mean >= usual.quality.shape_mean
-    assert found.p95 <= theirs.p95 and found.p99 <= theirs.p99
-
-
-@compiled_only
-@pytest.mark.parametrize(("most", "searches"), [(3000, 4), (10, 1)])
-def test_longer_searches_have_meshes_and_chances_of_their_own(
-    monkeypatch: pytest.MonkeyPatch, most: int, searches: int
-) -> None:
-    cloud, settings = st.PointCloud.from_array(cap(4.0, 1.0, 0.25)), st.Settings(length=1.0)
-    steps = steps_of(cloud, settings)
-    fields = orientation_fields(steps.samples, steps.boundary, settings)
-    improved = candidates.improve_fronts(candidates.advance_fronts(*steps, fields, settings), *steps, settings)
-    usual = candidates.chosen(candidates.those_that_pass(improved, *steps, settings))
-    nodes, begun = usual.mesh.net.nodes.copy(), list[tuple[int, Candidate]]()
-
-    def search(candidate: Candidate, *others: Any) -> None:
-        begun.append((others[-1], candidate))
-        assert np.array_equal(candidate.mesh.net.nodes, nodes)
-
-    monkeypatch.setattr(candidates, "search_on", search)
-    monkeypatch.setattr(candidates, "NODES_OF_SEVERAL_SEARCHES", most)
-    assert candidates.searched_on(usual, usual, [], *steps, settings) in [each for _, each in begun]
-    assert sorted(number for number, _ in begun) == list(range(searches))
-    meshes = [each.mesh for _, each in begun]
-    for one, two in combinations(meshes, 2):
-        pairs = zip((*one.net, one.patches), (*two.net, two.patches), strict=True)
-        assert not any(np.shares_memory(*pair) for pair in pairs)
-
-
-@compiled_only
-def test_a_longer_search_spares_the_places_of_its_faults_and_begins_again_from_its_last_good_grid(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """The second half of the turns all fail at one place, and each of them begins from the same grid.
-
-    Those after the first spare the place, and those after the second leave its nodes where they are.
-    """
-    cloud = st.PointCloud.from_array(cap(4.0, 1.0, 0.25))
-    settings = st.Settings(length=1.0)
-    steps = steps_of(cloud, settings)
-    fields = orientation_fields(steps.samples, steps.boundary, settings)
-    improved = candidates.improve_fronts(candidates.advance_fronts(*steps, fields, settings), *steps, settings)
-    best = candidates.chosen(candidates.those_that_pass(improved, *steps, settings))
-    begun: list[tuple[bytes, list[int]]] = []
-    held, moved = list[int](), list[float]()
-    fault = Fault("torn", "is torn", (0.5, 0.25, 4.0))
-
-    def searched(mesh: WorkingMesh, *others: Any) -> st.Grid:
-        begun.append((mesh.net.nodes.tobytes(), [len(each.places) for each in others[-2]]))
-        place = np.array(fault.where) - steps.samples.origin
-        near = np.linalg.norm(mesh.net.nodes - place, axis=1) < SPARED_AT_FAULT * mesh.length
-        at_rest = near & (mesh.net.degree > 0) & (mesh.net.kind == AT_REST)
-        held.append(int(at_rest.sum()))
-        before = mesh.net.nodes[at_rest]
-        grid = searched_again(mesh, *others)
-        moved.append(float(np.linalg.norm(mesh.net.nodes[at_rest] - before, axis=1).max(initial=0.0)))
-        return grid
-
-    def check(grid: st.Grid, *others: Any) -> Any:
-        now = judge(grid, *others)
-        fails = len(begun) > FREE_TURNS
-        return replace(now, certificate=replace(now.certificate, faults=(fault,))) if fails else now
-
-    monkeypatch.setattr("scantruss.improve.longer_search.searched_again", searched)
-    monkeypatch.setattr("scantruss.improve.longer_search.judged", check)
-    search_on(best, *steps, settings, known(best.judged))
-    sparing = begun[FREE_TURNS:]
-    assert len({nodes for nodes, _ in sparing}) == 1
-    assert [spared for _, spared in sparing] == [[k, 0] for k in range(SPARING_TURNS)]
-    assert max(moved) < 1e-6
-    assert min(held[FREE_TURNS + 2 :]) > max(held[: FREE_TURNS + 2])
-    assert known(grid_of_candidate(best).certificate).passed
 
 
 def test_fronts_that_would_all_miss_the_same_limbs_are_not_tried() -> None:

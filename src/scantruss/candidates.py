@@ -12,8 +12,8 @@ from .errors import CertificateError, FrontError
 from .front.advance import advance_front
 from .front.orientation_field import Field, FieldStart, orientation_fields
 from .improve.candidate import Candidate, grid_of, judged, misses_at_most
-from .improve.fit import take_fit
-from .improve.longer_search import is_no_worse, search_on, unevenness
+from .improve.fit import FARTHER_IF_EVENER, take_fit
+from .improve.longer_search import Turns, is_no_worse, search_on, unevenness
 from .improve.optimize import improve_first, improve_last
 from .improve.tip_search import MOST_MISSED, end_with_tips
 from .runtime.parallel import threaded_map
@@ -30,7 +30,11 @@ if TYPE_CHECKING:
 FULLY_IMPROVED = {"quick": 1, "normal": 1, "best": 3}  # fronts that are improved to the end
 FINALIST_BATCHES = 2  # times that finalists are tried
 LONGER_SEARCHES = 4  # longer searches of effort `best`, of which the most even grid is taken
-NODES_OF_SEVERAL_SEARCHES = 3000  # nodes of a grid above which there is one only
+TURNS_OF_BEST = Turns(free=18, sparing=18)
+NODES_OF_SEVERAL_SEARCHES = 3000  # nodes of a grid above which there is one only, and with `normal` none
+UNEVEN = 0.055  # variation of the lengths from which on effort `normal` searches a folded grid on
+SHORT_SEARCHES = 2  # searches then, at once
+TURNS_OF_NORMAL = Turns(free=0, sparing=8)
 
 
 def advance_fronts(
@@ -139,8 +143,8 @@ def best_that_passes(
 
     def fit(grid: Grid) -> Grid:
         before = grid_of(best)
-        take_fit(best, samples, boundary, constraints, settings)
-        return with_warnings_of(grid, before, grid_of(best))
+        ended = fitted_and_evened(best, samples, boundary, constraints, settings)
+        return with_warnings_of(grid, before, grid_of(ended))
 
     return grid_of(best).replace(fit=fit)
 
@@ -218,7 +222,7 @@ def no_worse(
     improved = improve_fronts(fronts, samples, boundary, constraints, lower)
     usual = chosen(those_that_pass(improved, samples, boundary, constraints, lower))
     compared = grid_of(usual)
-    take_fit(usual, samples, boundary, constraints, lower)
+    usual = fitted_and_evened(usual, samples, boundary, constraints, lower)
     passed: list[Candidate] = []
     with suppress(FrontError):
         passed = those_that_pass(candidates, samples, boundary, constraints, settings, progress=progress)
@@ -229,6 +233,28 @@ def no_worse(
     if best.mesh.sharp.any() or not better:  # elsewhere its own search leaves little
         best = searched_on(best, usual, passed, samples, boundary, constraints, lower)
     return compared.replace(settings=settings, fit=lambda grid: with_warnings_of(grid, compared, grid_of(best)))
+
+
+def fitted_and_evened(
+    candidate: Candidate, samples: SurfaceSamples, boundary: Boundary, constraints: Constraints, settings: Settings
+) -> Candidate:
+    """Return a candidate of effort `normal`, fitted to the scan, and after short longer searches where it is folded and uneven."""
+    take_fit(candidate, samples, boundary, constraints, settings)
+    grid, least = grid_of(candidate), candidate.judged
+    assert least is not None
+    is_folded = candidate.fit is not None or bool(candidate.mesh.sharp.any())
+    if not is_folded or grid.quality.length_cv <= UNEVEN or len(grid.nodes) > NODES_OF_SEVERAL_SEARCHES:
+        return candidate
+    turns = TURNS_OF_NORMAL
+    if candidate.fit is not None:  # which has come much nearer
+        turns = turns._replace(farther=FARTHER_IF_EVENER)
+    begun = [candidate, *(candidate.copy() for _ in range(SHORT_SEARCHES - 1))]
+
+    def search(number: int) -> None:
+        search_on(begun[number], samples, boundary, constraints, settings, least, turns, number)
+
+    threaded_map(search, range(len(begun)), None)
+    return min(begun, key=lambda each: unevenness(grid_of(each), settings.length))
 
 
 def fitted_at_last(grid: Grid) -> Grid:
@@ -268,7 +294,7 @@ def searched_on(
         begun += [usual.copy() for _ in range(LONGER_SEARCHES - len(begun))]
 
     def search(number: int) -> None:
-        search_on(begun[number], samples, boundary, constraints, settings, least, number)
+        search_on(begun[number], samples, boundary, constraints, settings, least, TURNS_OF_BEST, number)
 
     threaded_map(search, range(len(begun)), None)
     fit = [each for each in begun if is_no_worse(grid_of(each), least.checked_grid)]
