@@ -123,7 +123,7 @@ def test_a_longer_search_spares_the_places_of_its_faults_and_begins_again_from_i
 def test_a_grid_with_ridges_that_is_uneven_is_searched_on_by_normal_and_is_in_no_figure_worse(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(candidates, "UNEVEN", 0.0)
+    monkeypatch.setattr(candidates, "SEARCHED_ON_FROM", 0.0)
     usual, steps, settings = usual_of_gable()
     before = grid_of(usual)
     even = grid_of(fitted_and_evened(usual, *steps, settings))
@@ -137,7 +137,7 @@ def test_a_grid_with_ridges_that_is_uneven_is_searched_on_by_normal_and_is_in_no
 
 @compiled_only
 @pytest.mark.parametrize(
-    ("limits", "searches"), [({}, 2), ({"UNEVEN": 1.0}, 0), ({"NODES_OF_SEVERAL_SEARCHES": 10}, 0), (None, 0)]
+    ("limits", "searches"), [({}, 2), ({"SEARCHED_ON_FROM": 1.0}, 0), ({"NODES_OF_SEVERAL_SEARCHES": 10}, 0), (None, 0)]
 )
 def test_normal_searches_on_where_a_grid_is_folded_uneven_and_not_large(
     limits: dict[str, float] | None, searches: int, monkeypatch: pytest.MonkeyPatch
@@ -146,7 +146,7 @@ def test_normal_searches_on_where_a_grid_is_folded_uneven_and_not_large(
     usual, steps, settings = usual_of(cap(4.0, 1.0, 0.25), 1.0) if limits is None else usual_of_gable()
     begun: list[int] = []
     monkeypatch.setattr(candidates, "search_on", lambda *others: begun.append(others[-1]))
-    for name, limit in {"UNEVEN": 0.0, **(limits or {})}.items():
+    for name, limit in {"SEARCHED_ON_FROM": 0.0, **(limits or {})}.items():
         monkeypatch.setattr(candidates, name, limit)
     fitted_and_evened(usual, *steps, settings)
     assert sorted(begun) == list(range(searches))

@@ -32,7 +32,7 @@ FINALIST_BATCHES = 2  # times that finalists are tried
 LONGER_SEARCHES = 4  # longer searches of effort `best`, of which the most even grid is taken
 TURNS_OF_BEST = Turns(free=18, sparing=18)
 NODES_OF_SEVERAL_SEARCHES = 3000  # nodes of a grid above which there is one only, and with `normal` none
-UNEVEN = 0.055  # variation of the lengths from which on effort `normal` searches a folded grid on
+SEARCHED_ON_FROM = 0.055  # variation of the lengths from which on effort `normal` searches a folded grid on
 SHORT_SEARCHES = 2  # searches then, at once
 TURNS_OF_NORMAL = Turns(free=0, sparing=8)
 
@@ -243,7 +243,7 @@ def fitted_and_evened(
     grid, least = grid_of(candidate), candidate.judged
     assert least is not None
     is_folded = candidate.fit is not None or bool(candidate.mesh.sharp.any())
-    if not is_folded or grid.quality.length_cv <= UNEVEN or len(grid.nodes) > NODES_OF_SEVERAL_SEARCHES:
+    if not is_folded or grid.quality.length_cv <= SEARCHED_ON_FROM or len(grid.nodes) > NODES_OF_SEVERAL_SEARCHES:
         return candidate
     turns = TURNS_OF_NORMAL
     if candidate.fit is not None:  # which has come much nearer

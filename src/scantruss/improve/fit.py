@@ -1,8 +1,7 @@
 """Fit: at last nodes leave the crests of folds, and the scan a little, where members are more even and the scan is nearer for it.
 
 With all nodes on a scan that bends within a member, all of the scan lies to one side of the triangles; and with nodes on the very crests
-of rounded folds, or on tips, members between two of them are uneven. A ridge from which the scan would be farther for it is sharp: there
-they stay.
+of rounded folds, members between two of them are uneven. A ridge from which the scan would be farther for it is sharp: there they stay.
 """
 
 from __future__ import annotations
@@ -39,9 +38,7 @@ if TYPE_CHECKING:
     from ..surface.samples import SurfaceSamples
     from .working_mesh import Closed, WorkingMesh
 
-MORE_OF_LENGTHS = (
-    1.5  # times the weight of the lengths of members in the last sweeps of others, as distances count, too
-)
+MORE_OF_LENGTHS = 1.5  # times the weight of the lengths of members in the last sweeps before, as distances count, too
 ROUNDS_OF_FIT, SWEEPS_OF_FIT = 4, 6  # times that samples are assigned to triangles anew, and sweeps after each
 FITTED_FROM = (
     0.15  # distance of the scan from a grid at 99 %, its noise aside, from which on it is fitted [member lengths]
@@ -68,7 +65,7 @@ class Weights(NamedTuple):
     nodes: float
 
 
-WEIGHTS_TRIED = (Weights(16.0, 12.0), Weights(8.0, 8.0))  # the first that is better is taken
+WEIGHTS_TRIED = (Weights(14.0, 12.0), Weights(7.0, 8.0))  # the first that is better is taken
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,8 +190,7 @@ class _Fitting:
         self.soft = self._soft_curves(fit.sharp)
         near = {curve for curve, off in self._off_curves(self.off, self.nearest) if off < NEAR_SHARP}
         self.soft = self._soft_curves(fit.sharp | near)
-        on_tips = (mesh.net.kind == AT_REST) & (mesh.net.is_open == 0) & (mesh.net.line == 0) & ~mesh.fixed
-        self.is_free = ((mesh.net.kind == INTERIOR) | (self.soft >= 0) | on_tips).astype(np.int64)
+        self.is_free = ((mesh.net.kind == INTERIOR) | (self.soft >= 0)).astype(np.int64)
         moves = (mesh.net.degree > 0) & ~mesh.fixed & np.isfinite(mesh.projection_distance)
         moves &= (self.is_free == 1) | (mesh.net.kind == ON_CURVE)
         if len(fit.held):
