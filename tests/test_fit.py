@@ -255,3 +255,23 @@ def test_the_mesh_stays_as_it_is() -> None:
     away = np.linalg.norm(mesh.net.nodes[: len(grid.nodes)] - grid.nodes[0], axis=1)
     stayed = (again.nodes == mesh.net.nodes[: len(grid.nodes)]).all(axis=1)
     assert (stayed == (away <= fit.HELD_AT_FAULT * mesh.length)).all()
+
+
+@compiled_only
+def test_what_is_preferred_counts_in_a_fit() -> None:
+    rough = rough_sphere(count=120, points=3000)
+    mesh, samples = opened(rough)
+    qualities = [
+        fit.fitted(
+            mesh,
+            rough.grid,
+            samples,
+            Constraints(np.zeros((0, 3))),
+            rough.settings.replace(prefer=prefer),
+            fit.ScanFit(fit.WEIGHTS_TRIED[0]),
+        )[0].quality
+        for prefer in ("lengths", "balance", "shapes")
+    ]
+    assert sorted(each.length_cv for each in qualities) == [each.length_cv for each in qualities]
+    assert sorted(each.shape_mean for each in qualities) == [each.shape_mean for each in qualities]
+    assert qualities[0].length_cv < qualities[2].length_cv - 0.01

@@ -22,7 +22,7 @@ from scantruss.errors import CertificateError
 from scantruss.front.orientation_field import orientation_fields
 from scantruss.grid.certificate import Fault
 from scantruss.improve.candidate import Candidate, grid_of
-from scantruss.improve.longer_search import SPARED_AT_FAULT, Turns, search_on
+from scantruss.improve.longer_search import SPARED_AT_FAULT, Turns, is_as_near, search_on
 from scantruss.improve.optimize import searched_again
 from scantruss.improve.working_mesh import WorkingMesh
 from scantruss.kernels.mesh.grid import AT_REST
@@ -133,6 +133,23 @@ def test_a_grid_with_ridges_that_is_uneven_is_searched_on_by_normal_and_is_in_no
     assert even.quality.shape_mean >= before.quality.shape_mean
     assert known(found.scan_distance).p95 <= known(theirs.scan_distance).p95
     assert known(found.scan_distance).p99 <= known(theirs.scan_distance).p99
+
+
+@pytest.mark.parametrize("which", ["p95", "p99"])
+def test_a_grid_is_as_near_as_another_up_to_what_it_may_be_farther(which: str) -> None:
+    """At 95 and at 99 %; nearer at one does not make up for farther at the other."""
+    grid = st.grid_from_points(cap(4.0, 1.0, 0.25), st.Settings(length=1.0))
+    found = known(grid.certificate)
+    off = known(found.scan_distance)
+    other = "p99" if which == "p95" else "p95"
+    farther = replace(off, **{which: getattr(off, which) + 0.004, other: 0.5 * getattr(off, other)})
+    moved = grid.replace(certificate=replace(found, scan_distance=farther))
+    assert is_as_near(grid, grid)
+    assert not is_as_near(moved, grid)
+    assert not is_as_near(moved, grid, 0.003)
+    assert is_as_near(moved, grid, 0.005)
+    missing = grid.replace(certificate=replace(found, missing=found.missing + 0.01))
+    assert not is_as_near(missing, grid, 0.005)
 
 
 @compiled_only
