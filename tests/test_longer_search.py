@@ -170,9 +170,20 @@ def test_normal_searches_on_where_a_grid_is_folded_uneven_and_not_large(
 
 
 @compiled_only
+def test_the_mesh_in_the_end_is_that_of_the_grid_taken() -> None:
+    best, steps, settings = usual_of_gable()
+    before = best.judged
+    search_on(best, *steps, settings, known(best.judged), TURNS)
+    assert best.judged is not before
+    closed = best.mesh.to_grid(best.front)
+    assert (np.sort(closed.triangles) == np.sort(grid_of(best).triangles)).all()
+    assert (closed.nodes == grid_of(best).nodes).all()
+
+
+@compiled_only
 def test_what_only_the_whole_certificate_tells_leaves_the_grid_as_it_was(monkeypatch: pytest.MonkeyPatch) -> None:
     best, steps, settings = usual_of_gable()
-    before, ends = grid_of(best), list[st.Grid]()
+    before, ends, nodes = grid_of(best), list[st.Grid](), best.mesh.net.nodes.copy()
 
     def end(candidate: Candidate) -> None:
         ends.append(grid_of(candidate))
@@ -182,3 +193,4 @@ def test_what_only_the_whole_certificate_tells_leaves_the_grid_as_it_was(monkeyp
     search_on(best, *steps, settings, known(best.judged), TURNS)
     assert ends and ends[0].quality.length_cv < before.quality.length_cv
     assert grid_of(best) is before
+    assert (best.mesh.net.nodes == nodes).all()

@@ -64,8 +64,8 @@ def search_on(
     mesh, first, begun, least = candidate.mesh, candidate.judged, grid_of(candidate), usual.checked_grid
     assert first is not None
     off, faulty, lost, held = _distances_off(begun, samples), _NOWHERE, _NOWHERE, _NOWHERE
-    taken = last = mesh.copied()
-    farther, before = turns.farther * mesh.length, (first, begun)
+    start = taken = last = mesh.copied()
+    farther = turns.farther * mesh.length
     most = unevenness(begun, mesh.length) - LEAST_EVENED if is_no_worse(begun, least, farther) else np.inf
     for turn in range(turns.free + turns.sparing):
         is_free = turn < turns.free
@@ -100,11 +100,13 @@ def search_on(
             away = _distances_off(grid, samples)
             is_lost = (away > off + LEAST_FARTHER) & (away > np.quantile(off, FAR_PLACES))
             lost = np.concatenate([lost, _places(samples)[is_lost]])
+    mesh.restore(taken)
     if candidate.judged is not first:
         try:
             candidate.end()
         except CertificateError:  # nothing but the whole certificate tells
-            candidate.judged, candidate.grid = before
+            candidate.judged, candidate.grid = first, begun
+            mesh.restore(start)
 
 
 def _is_no_poorer(now: Judged, first: Judged) -> bool:
