@@ -16,7 +16,7 @@ import scantruss as st
 from scantruss.errors import CertificateError
 from scantruss.front.advance import advance_front
 from scantruss.front.orientation_field import orientation_fields
-from scantruss.improve import tip_search
+from scantruss.improve import fit, tip_search
 from scantruss.improve.candidate import Candidate, grid_of
 from scantruss.improve.optimize import improve_first, improve_last
 from scantruss.improve.tips import (
@@ -226,6 +226,7 @@ def test_of_grids_that_fail_in_the_whole_certificate_alone_that_of_the_last_turn
     failing: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     points, settings = eared_ball(1), st.Settings(length=1.0, allow_missing=0.2, ridge_angle=0.0)
+    monkeypatch.setattr(fit, "FITTED_FROM", np.inf)  # a fit ends another grid
     with monkeypatch.context() as patch:
         patch.setattr(tip_search, "TURNS_OF_TIPS", 0)
         without = st.grid_from_points(points, settings)
