@@ -34,11 +34,11 @@ def body(seed: int, bumps: int = 14, height: float = 0.3) -> Callable[[np.ndarra
 def surface(radius: Callable[[np.ndarray], np.ndarray], u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Points (N, 3) and outward normals of a body in given directions (N, 3)."""
     u = u / np.linalg.norm(u, axis=1)[:, None]
-    a = np.linalg.svd(u[:, :, None], full_matrices=True)[0][:, :, 1:]
+    across = np.cross(u, np.eye(3)[np.abs(u).argmin(axis=1)])
     step, points = 1e-4, radius(u)[:, None] * u
     ahead = []
-    for k in range(2):
-        v = u + step * a[:, :, k]
+    for aside in (across, np.cross(u, across)):
+        v = u + step * aside
         v /= np.linalg.norm(v, axis=1)[:, None]
         ahead.append(radius(v)[:, None] * v - points)
     normal = np.cross(ahead[0], ahead[1])
@@ -54,14 +54,17 @@ def scans_of(
     noise: float = 0.0,
     scale: float = 1.0,
 ) -> tuple[list[np.ndarray], list[np.ndarray]]:
-    """Scans [(N, 3)] of a body from view directions, and the poses (4, 4) from the frame of each into that of the body."""
+    """Scans [(N, 3)] of a body from view directions, and the poses (4, 4) from the frame of each into that of the body.
+
+    What is drawn for one does not depend on how many points the other shows: rounding decides that for the last ones.
+    """
     scans, poses = [], []
     for view in views:
         points, normal = surface(radius, rng.normal(size=(count, 3)))
-        seen = points[normal @ (np.asarray(view) / np.linalg.norm(view)) > 0.3]
+        is_seen = normal @ (np.asarray(view) / np.linalg.norm(view)) > 0.3
         spacing = np.sqrt(4 * np.pi / count) * 0.5
         pose = random_pose(rng)
-        world = scale * (seen + noise * spacing * rng.normal(size=seen.shape))
+        world = scale * (points + noise * spacing * rng.normal(size=points.shape))[is_seen]
         pose[:3, 3] *= scale
         poses.append(pose)
         scans.append((world - pose[:3, 3]) @ pose[:3, :3])

@@ -34,7 +34,7 @@ def angle_between(one: np.ndarray, other: np.ndarray) -> float:
 @pytest.fixture(scope="module")
 def views() -> tuple[View, View, np.ndarray]:
     """Two overlapping views of a body, and the true pose from the first to the second."""
-    rng = np.random.default_rng(3)
+    rng = np.random.default_rng(4)
     scans, poses = scans_of(body(2), [(1.0, 0.0, 0.0), (0.8, 0.6, 0.1)], rng, count=4000)
     return make_view(scans[0], SPACING), make_view(scans[1], SPACING), invert(poses[1]) @ poses[0]
 
