@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import weakref
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ..errors import InputError, LengthError, words_of_place
+from ..errors import LengthError
 from ..kernels.boundary import room as kernels
 from ..kernels.boundary.curves import Curves
 from ..kernels.mesh.point_location import nearest_sample
@@ -17,7 +16,6 @@ from ..kernels.surface.size_field import lengths_along
 from ..runtime.progress import Progress
 from ..scan.normals import check_two_sided
 from ..settings import Settings
-from ..surface.near_scan import distance_from_scan
 from ..surface.samples import SurfaceSamples, broad_normals, is_graded, samples_with
 from .corners import CURVE_STEP
 from .curves import length_around, resample
@@ -25,19 +23,17 @@ from .density import disc_beside
 from .given import cut_along
 from .holes import fill_holes
 from .offset import NO_BIAS, NO_TIPS, SamplingBias, offset_curve, sampling_bias_of
+from .parts import parted
 from .rolling_disc import loops_of_samples
 from .spikes import without_spikes
 from .touched_points import boundary_points
 from .tube_ends import end_of_tube
+from .which_holes import is_hole, named_holes
 
 LEAST_OPEN_SHARE = 0.6  # share of a loop that must have room for a disc outside
-# a piece this many times larger than a disc with its boundary length is nearly closed: the loop is a hole
-NEARLY_CLOSED = 10.0
 # distance from a ring where a limb was cut off within which a loop of the scan is that ring [member lengths]
 AT_RING = 0.6
 SPARSE_PART = 0.9  # quantile of the distance of the edge from the points, along a loop, that is said
-# farthest that the boundary of a hole passes a place that names it [member lengths]
-AT_HOLE = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,7 +152,9 @@ def find_boundary(
         if progress:
             progress("boundary", 0.4)
         filled, boundary = (_given if settings.boundary else _close_holes)(samples, settings)
-        boundary = _with_tube_ends(boundary, filled, settings) if settings.method == "default" else boundary
+        if settings.method == "default":
+            filled, boundary = (filled, boundary) if settings.boundary else _parted(filled, boundary)
+            boundary = _with_tube_ends(boundary, filled, settings)
         boundary = replace(boundary, loops=(*boundary.loops, *_rings(filled, settings)))
         # the value must not keep its key alive
         kept = _KEPT[samples] = (settings, filled if filled is not samples else None, boundary)
@@ -182,6 +180,17 @@ def _close_holes(samples: SurfaceSamples, settings: Settings) -> tuple[SurfaceSa
         loops = _external_first([loop for loop in found if not _over_filling(loop.points, samples)])
         bridged = [curve for curve in bridged if not _over_filling(curve, samples)]
     return samples, Boundary(loops, tuple(bridged))
+
+
+def _parted(samples: SurfaceSamples, boundary: Boundary) -> tuple[SurfaceSamples, Boundary]:
+    """Return samples with the pieces that a boundary parts, and that boundary, each part with an outer loop."""
+    parts = parted(samples, [loop.points for loop in boundary.loops])
+    if parts is samples:
+        return samples, boundary
+    first = [loop.points[0].tolist() for loop in boundary.loops]
+    pieces = [int(parts.piece[nearest_sample(parts.surface, *place)]) for place in first]
+    loops = [replace(loop, piece=piece) for loop, piece in zip(boundary.loops, pieces, strict=True)]
+    return parts, replace(boundary, loops=_external_first([loop for loop in loops if loop.piece in parts.pieces]))
 
 
 def _given(samples: SurfaceSamples, settings: Settings) -> tuple[SurfaceSamples, Boundary]:
@@ -246,32 +255,6 @@ def _rings(samples: SurfaceSamples, settings: Settings) -> list[Loop]:
     return loops
 
 
-def named_holes(
-    places: Sequence[Sequence[float]], loops: Sequence[Loop], samples: SurfaceSamples, length: float
-) -> set[int]:
-    """Return which loops are the holes that pass some places [scan unit]; a hole too small to be found is closed anyway.
-
-    Raises
-    ------
-    InputError
-        A place is not at the scan, or at an outer boundary alone.
-    """
-    found: set[int] = set()
-    for place in places:
-        here = np.array(place, float) - samples.origin
-        away = {k: float(np.linalg.norm(loop.points - here, axis=1).min()) for k, loop in enumerate(loops)}
-        near = sorted((gap, k) for k, gap in away.items() if gap <= AT_HOLE * length)
-        holes = [k for _, k in near if is_hole(loops[k], samples)]
-        if holes:
-            found.add(holes[0])
-        elif near or distance_from_scan(samples.surface, here) > AT_HOLE * length:
-            what = "at the outer boundary, which cannot be closed" if near else "not at the scan"
-            raise InputError(
-                f"the place {words_of_place(place)} of fill_at is {what}; name one on the boundary of a hole"
-            )
-    return found
-
-
 def _with_tube_ends(boundary: Boundary, samples: SurfaceSamples, settings: Settings) -> Boundary:
     """Return a boundary with the open ends of thin tubes among its loops, closed or left open like those of limbs that were cut off."""
     surface, loops, bridged = samples.surface, list(boundary.loops), []
@@ -286,12 +269,6 @@ def _with_tube_ends(boundary: Boundary, samples: SurfaceSamples, settings: Setti
         if ring is None or settings.cut_thin == "close":
             bridged.append(curve)
     return replace(boundary, loops=tuple(loops), bridged=tuple(bridged))
-
-
-def is_hole(loop: Loop, samples: SurfaceSamples) -> bool:
-    """Whether a loop bounds a hole: any internal loop, or the external loop of a nearly closed piece."""
-    share = float((samples.piece == loop.piece).mean())
-    return not loop.external or share * samples.area > NEARLY_CLOSED * loop.length**2 / (4 * np.pi)
 
 
 def _over_filling(curve: np.ndarray, samples: SurfaceSamples) -> bool:

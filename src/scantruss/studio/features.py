@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..boundary.find import find_boundary, is_hole
+from ..boundary.find import find_boundary
+from ..boundary.which_holes import is_hole
 from ..constraints.find import wanted_ridges
 from ..scan.cloud import PointCloud
 from ..settings import Settings

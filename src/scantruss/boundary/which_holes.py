@@ -1,0 +1,53 @@
+"""Which loops of a boundary bound holes, and which of them the settings name."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ..errors import InputError, words_of_place
+from ..surface.near_scan import distance_from_scan
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from ..surface.samples import SurfaceSamples
+    from .find import Loop
+
+# a piece this many times larger than a disc with its boundary length is nearly closed: the loop is a hole
+NEARLY_CLOSED = 10.0
+# farthest that the boundary of a hole passes a place that names it [member lengths]
+AT_HOLE = 1.0
+
+
+def is_hole(loop: Loop, samples: SurfaceSamples) -> bool:
+    """Whether a loop bounds a hole: any internal loop, or the external loop of a nearly closed piece."""
+    share = float((samples.piece == loop.piece).mean())
+    return not loop.external or share * samples.area > NEARLY_CLOSED * loop.length**2 / (4 * np.pi)
+
+
+def named_holes(
+    places: Sequence[Sequence[float]], loops: Sequence[Loop], samples: SurfaceSamples, length: float
+) -> set[int]:
+    """Return which loops are the holes that pass some places [scan unit]; a hole too small to be found is closed anyway.
+
+    Raises
+    ------
+    InputError
+        A place is not at the scan, or at an outer boundary alone.
+    """
+    found: set[int] = set()
+    for place in places:
+        here = np.array(place, float) - samples.origin
+        away = {k: float(np.linalg.norm(loop.points - here, axis=1).min()) for k, loop in enumerate(loops)}
+        near = sorted((gap, k) for k, gap in away.items() if gap <= AT_HOLE * length)
+        holes = [k for _, k in near if is_hole(loops[k], samples)]
+        if holes:
+            found.add(holes[0])
+        elif near or distance_from_scan(samples.surface, here) > AT_HOLE * length:
+            what = "at the outer boundary, which cannot be closed" if near else "not at the scan"
+            raise InputError(
+                f"the place {words_of_place(place)} of fill_at is {what}; name one on the boundary of a hole"
+            )
+    return found
