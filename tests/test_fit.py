@@ -275,3 +275,12 @@ def test_what_is_preferred_counts_in_a_fit() -> None:
     assert sorted(each.length_cv for each in qualities) == [each.length_cv for each in qualities]
     assert sorted(each.shape_mean for each in qualities) == [each.shape_mean for each in qualities]
     assert qualities[0].length_cv < qualities[2].length_cv - 0.01
+
+
+def test_far_samples_draw_more_than_near_ones() -> None:
+    """As their weight says where they are a tenth of a member off, so that it is that of usual ones; at most four times that."""
+    times = fit.drawing(np.linspace(0.0, 0.6, 61))
+    assert (np.diff(times) >= 0.0).all()
+    assert times[10] == pytest.approx(1.0, abs=0.01)
+    assert 0.2 < times[0] < 0.4
+    assert times[-1] == times.max() == 4.0

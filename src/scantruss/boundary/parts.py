@@ -6,10 +6,10 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
+from ..kernels.geometry.components import component_labels
+from ..kernels.geometry.kd_tree import nearest_of_places
+from ..scan.clean.nearby import build_kd_tree
 from ..surface.pieces import large_pieces, number_pieces, sample_areas
 
 if TYPE_CHECKING:
@@ -31,12 +31,13 @@ def parted(samples: SurfaceSamples, loops: Sequence[np.ndarray]) -> SurfaceSampl
         return samples
     surface = samples.surface
     across = _across_gaps(surface, loops)
+    if not across.any():
+        return samples
     start, column = np.nonzero((surface.neighbors >= 0) & ~across)
-    links = coo_array(
-        (np.ones(len(start), np.int8), (start, surface.neighbors[start, column])), (len(across), len(across))
-    )
-    part = connected_components(links, directed=False)[1]
-    if part.max() == samples.piece.max():
+    lowest = component_labels(len(across), start, surface.neighbors[start, column])
+    part = np.unique(lowest, return_inverse=True)[1]
+    across &= part[surface.neighbors] != part[:, None]
+    if not across.any():
         return samples
     neighbors = np.where(across, -1, surface.neighbors)
     neighbors = np.take_along_axis(neighbors, np.argsort(neighbors < 0, axis=1, kind="stable"), axis=1)
@@ -58,10 +59,11 @@ def parted(samples: SurfaceSamples, loops: Sequence[np.ndarray]) -> SurfaceSampl
 
 def _across_gaps(surface: Surface, loops: Sequence[np.ndarray]) -> np.ndarray:
     """Return which links (S, K) bool join the samples at one loop with those at another across a gap."""
-    away, nearest = cKDTree(np.concatenate(loops)).query(surface.mean)
+    squares, nearest = np.empty(len(surface.mean)), np.empty(len(surface.mean), np.int64)
+    nearest_of_places(build_kd_tree(np.concatenate(loops)), surface.mean, 1, squares, nearest)
     local = surface.length * surface.field
     at = np.repeat(np.arange(len(loops)), [len(loop) for loop in loops])[nearest]
-    at[away > AT_LOOP * local] = -1
+    at[squares > (AT_LOOP * local) ** 2] = -1
     start, column = np.nonzero((surface.neighbors >= 0) & (at >= 0)[:, None])
     end = surface.neighbors[start, column]
     far = np.linalg.norm(surface.mean[start] - surface.mean[end], axis=1)

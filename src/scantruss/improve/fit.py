@@ -46,8 +46,10 @@ FITTED_FROM = (
 # what it is worth that nodes leave the scan: by how much the lengths must vary less, or the scan be nearer at 99 % [member lengths]
 WORTH_EVENER, WORTH_NEARER = 0.005, 0.03
 FARTHEST_DRAWING = 0.6  # distance of a sample from its triangle beyond which it draws no node [member lengths]
+# how many times its weight a sample counts on its triangle and at most, and how far off it counts once more [member lengths]
+NEAR_SAMPLES_DRAW, FAR_SAMPLES_DRAW, DRAW_ONE_MORE = 0.3, 4.0, 0.12
 FACES_ITS_TRIANGLE = -0.2  # cosine between the normals of a sample and its triangle below which that is another side
-SHARE_OF_POOR = 0.9  # share of the distance from the scan that is poor, or the largest allowed, to which nodes go
+SHARE_OF_POOR = 0.97  # share of the distance from the scan that is poor, or the largest allowed, to which nodes go
 # a ridge is sharp from which the samples beside it lie no farther, as rms, or from which they lie farther by so much once it was fitted
 NEAR_SHARP, FARTHER_AT_SHARP = 0.03, 0.01  # [member lengths]
 HELD_AT_FAULT = 2.0  # distance from a fault within which nodes stay [member lengths]
@@ -59,13 +61,16 @@ FARTHER_IF_EVENER = 0.005  # by how much farther at 95 and 99 % the scan may be 
 
 
 class Weights(NamedTuple):
-    """What distances cost in a fit: the energy of a grid all of whose samples, or nodes, are a member off, for each node."""
+    """What distances cost in a fit: the energy of a grid all of whose samples, or nodes, are a member off, for each node.
+
+    That of samples counts as it is a tenth of a member off, see `drawing`.
+    """
 
     samples: float
     nodes: float
 
 
-WEIGHTS_TRIED = (Weights(14.0, 12.0), Weights(7.0, 8.0))  # the first that is better is taken
+WEIGHTS_TRIED = (Weights(8.0, 3.0), Weights(5.0, 4.0))  # the first that is better is taken
 
 
 @dataclass(frozen=True, eq=False)
@@ -169,6 +174,12 @@ def fitted(
         net.nodes[:], net.arc[:] = nodes, arc
 
 
+def drawing(off: np.ndarray) -> np.ndarray:
+    """Return how many times their weight samples count that are so far off their triangles [member lengths], (S,): far ones are seen."""
+    times: np.ndarray = np.minimum(NEAR_SAMPLES_DRAW + (off / DRAW_ONE_MORE) ** 2, FAR_SAMPLES_DRAW)
+    return times
+
+
 class _Fitting:
     """A mesh while its nodes move to where it fits the scan."""
 
@@ -266,7 +277,7 @@ class _Fitting:
         put_feet_of_samples(self.places, nodes, corners, self.nearest, shares, off, direction)
         a, b, c = (nodes[corners[:, k]] for k in range(3))
         area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / count
-        weight = self.fit.weights.samples * area / (AREA_OF_NODE * self.local**4)
+        weight = self.fit.weights.samples * drawing(off / self.local) * area / (AREA_OF_NODE * self.local**4)
         node, entry = corners[self.nearest].ravel(), np.flatnonzero(shares.ravel() > 0.0)
         entry = entry[np.argsort(node[entry], kind="stable")]
         start = np.searchsorted(node[entry], np.arange(len(self.soft) + 1))
