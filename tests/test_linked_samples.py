@@ -14,7 +14,7 @@ from scantruss.kernels.boundary.loops import come_nearer
 from scantruss.kernels.surface.normals import mark_uneven
 from scantruss.settings import SAMPLE_SPACING, SMOOTH_SAMPLE_SPACING
 from scantruss.surface.chosen_samples import SPARSE_SPACING
-from scantruss.surface.linked_samples import link_samples
+from scantruss.surface.linked_samples import link_samples, refined
 from scantruss.surface.samples import SurfaceSamples, sample_surface, samples_with, with_whole_boundary
 
 
@@ -168,3 +168,17 @@ def test_a_body_without_the_underside_of_its_base_faces_outwards() -> None:
     assert ((normals[on_shaft, :2] * mean[on_shaft, :2]).sum(axis=1) > 0.0).all()
     on_base = (np.abs(mean[:, 2] - 0.3) < 0.1) & (np.abs(np.hypot(mean[:, 0], mean[:, 1]) - 3.0) < 0.8)
     assert on_base.any() and (normals[on_base, 2] > 0.9).all()
+
+
+def test_no_sample_is_without_a_point_where_finer_ones_lie_beside_it() -> None:
+    """Samples that were moved off a rough layer lie farther from their points than finer ones do."""
+    rng = np.random.default_rng(3)
+    points = sheet(6, 6, 0.05, noise=0.02)
+    found = link_samples(points, 0.2, 1.0, 0.05)
+    coarse = rng.random(len(found.mean)) < 0.7
+    moved = found._replace(mean=found.mean + (0.0, 0.0, 0.19))
+    finer = refined(moved, points, coarse, 0.1, 1.0, 0.05)
+    many = np.diff(finer.start)
+    assert many.min() > 0
+    assert many.sum() == len(points)
+    assert np.array_equal(many, np.bincount(finer.owner, minlength=len(many)))

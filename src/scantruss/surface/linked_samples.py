@@ -136,6 +136,8 @@ def refined(
     neighbors = _neighbors(places, boxes, length, radius, spacing, NO_NORMALS)
     settled = points, places, neighbors, owners, NO_NORMALS, chosen
     run_in_parts(len(points), LINKED_POINTS_PER_THREAD, kernels.settle_points, *settled)
+    alone = np.flatnonzero(np.bincount(owners, minlength=len(chosen)) == 0)
+    owners[chosen[alone]] = alone  # one that lies at no point may lose all of its points to finer ones: its own stays
     grouped, start, mean = group(points, owners, len(chosen))
     mean[:kept] = places[:kept]
     return Linked(owners, chosen, grouped, start, boxes, mean, neighbors, *_normals(mean, neighbors))
