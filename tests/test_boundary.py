@@ -4,14 +4,15 @@ from typing import Any, Never
 
 import numpy as np
 import pytest
+from edged_surfaces import edged_surface
 from numpy.typing import ArrayLike
 from shapes import make
 from small_clouds import ball, cap, ring, samples_of, sheet, tire, turn_of
 from steps import boundary_of
 
 import scantruss as st
-from scantruss.boundary.curves import resample
-from scantruss.boundary.find import Loop, characteristic_points
+from scantruss.boundary.curves import area_within, resample
+from scantruss.boundary.find import POINTS_OF_RANDOM_HOLE, Loop, characteristic_points
 from scantruss.boundary.offset import SamplingBias, close_random_bays
 from scantruss.boundary.touched_points import _onwards as onwards
 
@@ -409,3 +410,28 @@ def test_a_spike_on_a_straight_side_is_no_corner() -> None:
     boundary, _ = found(np.column_stack([x, y, np.zeros(len(x))])[kept], 1.0)
     assert len(boundary.corners) == 4
     assert np.linalg.norm(boundary.loops[0].points - [5.0, -0.9, 0.0], axis=1).min() > 0.5
+
+
+def test_a_hole_that_random_sampling_explains_is_none() -> None:
+    """Where points lie at random they leave a place free here and there, by chance one with a boundary of more than four members."""
+    surface = edged_surface(10_298)  # a box, sparse and closed
+    boundary = boundary_of(st.PointCloud.from_array(surface.points), st.Settings(length=surface.length))
+    assert boundary.loops == ()
+
+
+@pytest.mark.parametrize("density", [30.0, 200.0])
+def test_a_hole_in_which_more_points_are_expected_is_one(density: float) -> None:
+    rng = np.random.default_rng(5)
+    points = rng.uniform(-6, 6, (int(density * 144), 3)) * (1, 1, 0)
+    in_slot = (np.abs(points[:, 0]) < 0.75) & (np.abs(points[:, 1]) < 0.45)
+    boundary, _ = found(points[~in_slot])
+    outer, hole = sorted(boundary.loops, key=lambda loop: -loop.length)
+    assert outer.length == pytest.approx(48.0, rel=0.01)
+    assert 4.0 < hole.length < 5.0
+    assert area_within(hole.points) * density > POINTS_OF_RANDOM_HOLE
+
+
+def test_the_area_within_a_curve_is_that_of_its_polygon() -> None:
+    turn = turn_of(3)
+    ell = np.column_stack([np.array(ELL, float), np.zeros(len(ELL))])
+    assert area_within(ell @ turn.T + (5.0, -2.0, 1.0)) == pytest.approx(108.0)

@@ -25,6 +25,12 @@ def length_around(turns: np.ndarray) -> float:
     return float(np.linalg.norm(np.roll(turns, -1, axis=0) - turns, axis=1).sum())
 
 
+def area_within(curve: np.ndarray) -> float:
+    """Return the area within a closed curve (M, 3), as seen along the direction in which that is largest."""
+    spokes = curve - curve.mean(axis=0)
+    return 0.5 * float(np.linalg.norm(np.cross(spokes, np.roll(spokes, -1, axis=0)).sum(axis=0)))
+
+
 def smooth_turns(turns: np.ndarray) -> np.ndarray:
     """A closed polyline with its zigzag halved."""
     return 0.5 * turns + 0.25 * (np.roll(turns, 1, axis=0) + np.roll(turns, -1, axis=0))

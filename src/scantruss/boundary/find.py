@@ -18,7 +18,7 @@ from ..scan.normals import check_two_sided
 from ..settings import Settings
 from ..surface.samples import SurfaceSamples, broad_normals, is_graded, samples_with
 from .corners import CURVE_STEP
-from .curves import length_around, resample
+from .curves import area_within, length_around, resample
 from .density import disc_beside
 from .given import cut_along
 from .holes import fill_holes
@@ -33,6 +33,8 @@ from .which_holes import is_hole, named_holes
 LEAST_OPEN_SHARE = 0.6  # share of a loop that must have room for a disc outside
 # distance from a ring where a limb was cut off within which a loop of the scan is that ring [member lengths]
 AT_RING = 0.6
+# a hole where no more points than this are expected is random in a scan of random points, and closed up to so many times the usual length
+POINTS_OF_RANDOM_HOLE, LARGER_IF_RANDOM = 24.0, 1.25
 SPARSE_PART = 0.9  # quantile of the distance of the edge from the points, along a loop, that is said
 
 
@@ -307,9 +309,13 @@ def smooth_loop(
     smoothed, corner_at = offset_curve(curve, bias, settings, surface, tips)
     length, field = length_around(smoothed), field_along(surface, smoothed)
     in_lengths = length if field is None else float((_steps(smoothed) / _between(field)).sum())
-    if (in_lengths if settings.fill_holes is None else length) < settings.bridged_boundary_length:
+    beyond, density = bias.along(surface, smoothed)
+    least = settings.bridged_boundary_length
+    if settings.fill_holes is None and bias.beyond > 0.0:
+        random = area_within(smoothed) * float(np.median(density)) <= POINTS_OF_RANDOM_HOLE
+        least *= LARGER_IF_RANDOM if random else 1.0
+    if (in_lengths if settings.fill_holes is None else length) < least:
         return None
-    beyond = bias.along(surface, smoothed)[0]
     sparse = float(np.quantile(beyond, SPARSE_PART))
     return Loop(smoothed, corner_at, False, length, piece, field, beyond=sparse, sparse_at=int(beyond.argmax()))
 
