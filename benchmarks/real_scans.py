@@ -77,10 +77,10 @@ SCANS = (
 )  # fmt: skip
 
 WEAKEST = (
-    "The range scan of the bunny from the front falls into pieces where the scanner saw little, and its edges are ragged; with members of"
-    " 0.0087 a grid passes only by its 22nd attempt.",
-    "The range scan of the bunny from the side has notches in its edges, gaps bridged and holes closed where the scanner saw little;"
-    " a paw is left out.",
+    "The figure with thin limbs has a hand cut off with members of 0.057, its other arm ends in a point, and its slit between the legs is"
+    " filled.",
+    "The range scans of the bunny from the front and from the side have notches in their edges, gaps bridged and holes closed where the"
+    " scanner saw little; a paw is left out.",
     "The vase with members of 28 has a ragged lip, as that is rounded within less than a member; its wall of 10 carries a grid on"
     " either side.",
 )
