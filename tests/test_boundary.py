@@ -15,6 +15,7 @@ from scantruss.boundary.curves import area_within, resample
 from scantruss.boundary.find import POINTS_OF_RANDOM_HOLE, Loop, characteristic_points
 from scantruss.boundary.offset import SamplingBias, close_random_bays
 from scantruss.boundary.touched_points import _onwards as onwards
+from scantruss.boundary.which_holes import is_covered
 
 
 def found(points: np.ndarray, length: float = 1.0, **settings: Any) -> tuple[st.Boundary, np.ndarray]:
@@ -435,3 +436,16 @@ def test_the_area_within_a_curve_is_that_of_its_polygon() -> None:
     turn = turn_of(3)
     ell = np.column_stack([np.array(ELL, float), np.zeros(len(ELL))])
     assert area_within(ell @ turn.T + (5.0, -2.0, 1.0)) == pytest.approx(108.0)
+
+
+def test_a_loop_with_points_all_over_its_inside_bounds_no_hole() -> None:
+    """Those of another sheet behind a hole do not count, nor do a few strays in it."""
+    angle = np.linspace(0, 2 * np.pi, 90, endpoint=False)
+    curve = np.column_stack([np.cos(angle), 0.6 * np.sin(angle), 0 * angle])
+    whole = sheet(8, 8, 0.1)
+    inside = np.hypot(whole[:, 0], whole[:, 1] / 0.6) < 1.0
+    behind = np.concatenate([whole[~inside], whole + (0, 0, 0.4)])
+    strays = np.concatenate([whole[~inside], whole[inside][::4]])
+    for points, covered in ((whole, True), (whole[~inside], False), (behind, False), (strays, False)):
+        samples = samples_of(points, outlier_distance=0.0)
+        assert is_covered(curve - samples.origin, samples.surface, 100.0) == covered

@@ -28,13 +28,14 @@ from .rolling_disc import loops_of_samples
 from .spikes import without_spikes
 from .touched_points import boundary_points
 from .tube_ends import end_of_tube
-from .which_holes import is_hole, named_holes
+from .which_holes import is_covered, is_hole, named_holes
 
 LEAST_OPEN_SHARE = 0.6  # share of a loop that must have room for a disc outside
 # distance from a ring where a limb was cut off within which a loop of the scan is that ring [member lengths]
 AT_RING = 0.6
 # a hole where no more points than this are expected is random in a scan of random points, and closed up to so many times the usual length
 POINTS_OF_RANDOM_HOLE, LARGER_IF_RANDOM = 24.0, 1.25
+LONGEST_COVERED = 8.0  # longest loop of which points inside it say that it bounds no hole [member lengths]
 SPARSE_PART = 0.9  # quantile of the distance of the edge from the points, along a loop, that is said
 
 
@@ -315,6 +316,8 @@ def smooth_loop(
         random = area_within(smoothed) * float(np.median(density)) <= POINTS_OF_RANDOM_HOLE
         least *= LARGER_IF_RANDOM if random else 1.0
     if (in_lengths if settings.fill_holes is None else length) < least:
+        return None
+    if length < LONGEST_COVERED * settings.length and is_covered(smoothed, surface, float(np.median(density))):
         return None
     sparse = float(np.quantile(beyond, SPARSE_PART))
     return Loop(smoothed, corner_at, False, length, piece, field, beyond=sparse, sparse_at=int(beyond.argmax()))

@@ -8,15 +8,20 @@ import numpy as np
 
 from ..errors import InputError, words_of_place
 from ..surface.near_scan import distance_from_scan
+from .curves import area_within
+from .polylines import well_within
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from ..kernels.surface.local_surface import Surface
     from ..surface.samples import SurfaceSamples
     from .find import Loop
 
 # a piece this many times larger than a disc with its boundary length is nearly closed: the loop is a hole
 NEARLY_CLOSED = 10.0
+# distance from the plane of a hole within which points lie inside it [member lengths], and from what share of those expected on it is none
+BESIDE_HOLE, COVERED_FROM = 0.12, 0.5
 # farthest that the boundary of a hole passes a place that names it [member lengths]
 AT_HOLE = 1.0
 
@@ -25,6 +30,23 @@ def is_hole(loop: Loop, samples: SurfaceSamples) -> bool:
     """Whether a loop bounds a hole: any internal loop, or the external loop of a nearly closed piece."""
     share = float((samples.piece == loop.piece).mean())
     return not loop.external or share * samples.area > NEARLY_CLOSED * loop.length**2 / (4 * np.pi)
+
+
+def is_covered(curve: np.ndarray, surface: Surface, density: float) -> bool:
+    """Whether points lie all over the inside of a closed curve (M, 3), so that it bounds no hole, as a loop along a sharp edge.
+
+    density : of the points beside it [1 / scan unit^2]
+    """
+    middle = curve.mean(axis=0)
+    flat = np.linalg.svd(curve - middle, full_matrices=False)[2]
+    ring = (curve - middle) @ flat.T
+    reach = np.linalg.norm(ring, axis=1).max() + surface.step
+    near = np.flatnonzero(np.linalg.norm(surface.mean - middle, axis=1) < reach)
+    owned = [surface.points[surface.start[k] : surface.start[k + 1]] for k in near.tolist()]
+    points = (np.concatenate([curve[:0], *owned]) - middle) @ flat.T
+    points = points[np.abs(points[:, 2]) < BESIDE_HOLE * surface.length]
+    inside = well_within(points[:, :2], ring[:, :2], 0.0)
+    return float(inside.sum()) >= COVERED_FROM * density * area_within(curve)
 
 
 def named_holes(
