@@ -11,7 +11,7 @@ from small_clouds import ball, cap, ring, samples_of, sheet, tire, turn_of
 from steps import boundary_of
 
 import scantruss as st
-from scantruss.boundary.curves import area_within, resample
+from scantruss.boundary.curves import area_within, length_around, resample
 from scantruss.boundary.find import POINTS_OF_RANDOM_HOLE, Loop, characteristic_points
 from scantruss.boundary.offset import SamplingBias, close_random_bays
 from scantruss.boundary.touched_points import _onwards as onwards
@@ -439,7 +439,7 @@ def test_the_area_within_a_curve_is_that_of_its_polygon() -> None:
 
 
 def test_a_loop_with_points_all_over_its_inside_bounds_no_hole() -> None:
-    """Those of another sheet behind a hole do not count, nor do a few strays in it."""
+    """Those of another sheet behind a hole do not count, nor those of another piece, as of a floor below a column, nor a few strays."""
     angle = np.linspace(0, 2 * np.pi, 90, endpoint=False)
     curve = np.column_stack([np.cos(angle), 0.6 * np.sin(angle), 0 * angle])
     whole = sheet(8, 8, 0.1)
@@ -448,4 +448,9 @@ def test_a_loop_with_points_all_over_its_inside_bounds_no_hole() -> None:
     strays = np.concatenate([whole[~inside], whole[inside][::4]])
     for points, covered in ((whole, True), (whole[~inside], False), (behind, False), (strays, False)):
         samples = samples_of(points, outlier_distance=0.0)
-        assert is_covered(curve - samples.origin, samples.surface, 100.0) == covered
+        here = curve - samples.origin
+        own = int(samples.piece[np.linalg.norm(samples.surface.mean - here[0], axis=1).argmin()])
+        for piece, size in ((own, 1.0), (own + 1, 1.0), (own, 2.0)):
+            loop = Loop(size * here, np.zeros(0, np.int64), False, size * length_around(here), piece)
+            counts = covered and (piece, size) == (own, 1.0)
+            assert is_covered(loop, 100.0, samples.surface, samples.piece) == counts

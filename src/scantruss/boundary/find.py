@@ -35,7 +35,6 @@ LEAST_OPEN_SHARE = 0.6  # share of a loop that must have room for a disc outside
 AT_RING = 0.6
 # a hole where no more points than this are expected is random in a scan of random points, and closed up to so many times the usual length
 POINTS_OF_RANDOM_HOLE, LARGER_IF_RANDOM = 24.0, 1.25
-LONGEST_COVERED = 8.0  # longest loop of which points inside it say that it bounds no hole [member lengths]
 SPARSE_PART = 0.9  # quantile of the distance of the edge from the points, along a loop, that is said
 
 
@@ -230,9 +229,14 @@ def _find_loops(samples: SurfaceSamples, settings: Settings) -> tuple[list[Loop]
             found.append((curve, piece, bias, tips))
     found = [each for each in found if not _at_ring(each[0], samples, length)]
     bridged = [curve for curve in bridged if not _at_ring(curve, samples, length)]
-    smoothed = [smooth_loop(curve, piece, bias, settings, whole, tips) for curve, piece, bias, tips in found]
-    bridged += [curve for (curve, *_), loop in zip(found, smoothed, strict=True) if loop is None]
-    return [loop for loop in smoothed if loop is not None], bridged
+    kept: list[Loop] = []
+    for curve, piece, bias, tips in found:
+        smoothed = smooth_loop(curve, piece, bias, settings, whole, tips)
+        if smoothed is None or (not paper and is_covered(smoothed, bias.density, whole, samples.piece)):
+            bridged.append(curve)
+        else:
+            kept.append(smoothed)
+    return kept, bridged
 
 
 def _at_ring(curve: np.ndarray, samples: SurfaceSamples, length: float) -> bool:
@@ -316,8 +320,6 @@ def smooth_loop(
         random = area_within(smoothed) * float(np.median(density)) <= POINTS_OF_RANDOM_HOLE
         least *= LARGER_IF_RANDOM if random else 1.0
     if (in_lengths if settings.fill_holes is None else length) < least:
-        return None
-    if length < LONGEST_COVERED * settings.length and is_covered(smoothed, surface, float(np.median(density))):
         return None
     sparse = float(np.quantile(beyond, SPARSE_PART))
     return Loop(smoothed, corner_at, False, length, piece, field, beyond=sparse, sparse_at=int(beyond.argmax()))

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 NEARLY_CLOSED = 10.0
 # distance from the plane of a hole within which points lie inside it [member lengths], and from what share of those expected on it is none
 BESIDE_HOLE, COVERED_FROM = 0.12, 0.5
+LONGEST_COVERED = 8.0  # longest loop of which points inside it say that it bounds no hole [member lengths]
 # farthest that the boundary of a hole passes a place that names it [member lengths]
 AT_HOLE = 1.0
 
@@ -32,21 +33,25 @@ def is_hole(loop: Loop, samples: SurfaceSamples) -> bool:
     return not loop.external or share * samples.area > NEARLY_CLOSED * loop.length**2 / (4 * np.pi)
 
 
-def is_covered(curve: np.ndarray, surface: Surface, density: float) -> bool:
-    """Whether points lie all over the inside of a closed curve (M, 3), so that it bounds no hole, as a loop along a sharp edge.
+def is_covered(loop: Loop, density: float, surface: Surface, piece: np.ndarray) -> bool:
+    """Whether points of the piece that a loop bounds lie all over its inside, so that it bounds no hole, as one along a sharp edge.
 
     density : of the points beside it [1 / scan unit^2]
+    piece : (S,) of each sample
     """
-    middle = curve.mean(axis=0)
-    flat = np.linalg.svd(curve - middle, full_matrices=False)[2]
-    ring = (curve - middle) @ flat.T
+    length = surface.length * (1.0 if loop.desired is None else float(loop.desired.min()))
+    if loop.length > LONGEST_COVERED * length:  # as all outer boundaries are
+        return False
+    middle = loop.points.mean(axis=0)
+    axes = np.linalg.svd(loop.points - middle, full_matrices=False)[2]
+    ring = (loop.points - middle) @ axes.T
     reach = np.linalg.norm(ring, axis=1).max() + surface.step
-    near = np.flatnonzero(np.linalg.norm(surface.mean - middle, axis=1) < reach)
-    owned = [surface.points[surface.start[k] : surface.start[k + 1]] for k in near.tolist()]
-    points = (np.concatenate([curve[:0], *owned]) - middle) @ flat.T
-    points = points[np.abs(points[:, 2]) < BESIDE_HOLE * surface.length]
+    near = (piece == loop.piece) & (np.linalg.norm(surface.mean - middle, axis=1) < reach)
+    owned = [surface.points[surface.start[k] : surface.start[k + 1]] for k in np.flatnonzero(near).tolist()]
+    points = (np.concatenate([loop.points[:0], *owned]) - middle) @ axes.T
+    points = points[np.abs(points[:, 2]) < BESIDE_HOLE * length]
     inside = well_within(points[:, :2], ring[:, :2], 0.0)
-    return float(inside.sum()) >= COVERED_FROM * density * area_within(curve)
+    return float(inside.sum()) >= COVERED_FROM * density * area_within(loop.points)
 
 
 def named_holes(
