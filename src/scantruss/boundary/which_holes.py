@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 # a piece this many times larger than a disc with its boundary length is nearly closed: the loop is a hole
 NEARLY_CLOSED = 10.0
 # distance from the plane of a hole within which points lie inside it [member lengths], and from what share of those expected on it is none
-BESIDE_HOLE, COVERED_FROM = 0.12, 0.5
+IN_PLANE_OF_HOLE, COVERED_FROM = 0.12, 0.5
 LONGEST_COVERED = 8.0  # longest loop of which points inside it say that it bounds no hole [member lengths]
 # farthest that the boundary of a hole passes a place that names it [member lengths]
 AT_HOLE = 1.0
@@ -49,7 +49,7 @@ def is_covered(loop: Loop, density: float, surface: Surface, piece: np.ndarray) 
     near = (piece == loop.piece) & (np.linalg.norm(surface.mean - middle, axis=1) < reach)
     owned = [surface.points[surface.start[k] : surface.start[k + 1]] for k in np.flatnonzero(near).tolist()]
     points = (np.concatenate([loop.points[:0], *owned]) - middle) @ axes.T
-    points = points[np.abs(points[:, 2]) < BESIDE_HOLE * length]
+    points = points[np.abs(points[:, 2]) < IN_PLANE_OF_HOLE * length]
     inside = well_within(points[:, :2], ring[:, :2], 0.0)
     return float(inside.sum()) >= COVERED_FROM * density * area_within(loop.points)
 
