@@ -155,7 +155,8 @@ def find_boundary(
             progress("boundary", 0.4)
         filled, boundary = (_given if settings.boundary else _close_holes)(samples, settings)
         if settings.method == "default":
-            filled, boundary = (filled, boundary) if settings.boundary else _parted(filled, boundary)
+            if not settings.boundary:
+                filled, boundary = _parted(filled, boundary)
             boundary = _with_tube_ends(boundary, filled, settings)
         boundary = replace(boundary, loops=(*boundary.loops, *_rings(filled, settings)))
         # the value must not keep its key alive
